@@ -13,6 +13,7 @@ from poise.envs.compiled.calls import call, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.simulation import physics_step
+from poise.envs.sensing.realism import Realism
 
 from .policy_step import (
     PolicyStep,
@@ -24,7 +25,8 @@ from .policy_step import (
     set_targets,
 )
 
-OPEN, CALM, AUTHORITY, TOOK = range(4)  # entries of `HandOver.memory`
+OPEN, CALM, AUTHORITY, TOOK, OPENS, CLOSES, ENTRIES = range(7)  # of `HandOver.memory`
+MISPLACED = 0.02  # [rad] by which joints and tilt together may be biased, see `uncertain`
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,9 @@ class HandOverConfig:
         joint_speed: Speed of all joints together, root mean square, below which it counts as calm
             [rad/s].
         calm_time: Time for which it must be calm before the controller takes back [s].
+        uncertain: Distance that takes the place of `opens` and `closes` where joints and tilt
+            together may be biased by 0.02 rad or more, or somebody else moves the arms [m]; None:
+            these are it there, too.
     """
 
     opens: float = field(default=0.06, metadata={"above": 0.0})
@@ -52,23 +57,32 @@ class HandOverConfig:
     speed: float = field(default=0.1, metadata={"above": 0.0})
     joint_speed: float = field(default=0.4, metadata={"above": 0.0})
     calm_time: float = field(default=0.2, metadata={"above": 0.0})
+    uncertain: float | None = field(default=None, metadata={"above": 0.0, "omit": "default"})
 
     def __post_init__(self) -> None:
         if self.closes > self.opens:
             raise ValueError(f"closes: {self.closes} m is above opens, {self.opens} m")
+
+    def distances(self, level: Realism) -> tuple[float, float]:
+        """The distances that open and close [m] at a level of realism."""
+        moved = bool(np.any(level.motors.arms))
+        if self.uncertain is not None and (moved or level.misplaced >= MISPLACED):
+            return self.uncertain, self.uncertain
+        return self.opens, self.closes
 
 
 @dataclass(frozen=True, eq=False)
 class HandOver(Block):
     """The limits of `HandOverConfig`, and what is remembered of the episode."""
 
-    opens: float  # squared [m²]
-    closes: float  # squared [m²]
     cos_tilt: float
     speed: float  # squared [m²/s²]
     joint_speed: float  # mean square [rad²/s²]
     calm_steps: float  # policy steps
-    memory: np.ndarray  # (4,) may take over, calm steps in a row, authority w, took over
+    memory: (
+        np.ndarray
+    )  # (6,) may take over, calm steps in a row, authority w, took over; the squares
+    # of the distances that open and close [m²]
     begin: CallbackAddress  # begins a new trial of the controller
 
 
@@ -88,7 +102,7 @@ def is_calm(h: HandOver, step: PolicyStep, distance: float) -> bool:
     `distance` [m²] is the square of the capture point's distance from the reference's.
     """
     s = step.inputs.state
-    if distance > h.closes or uprightness(step.inputs.robot, s) < h.cos_tilt:
+    if distance > h.memory[CLOSES] or uprightness(step.inputs.robot, s) < h.cos_tilt:
         return False
     for i in range(s.contacts.shape[0]):
         if not s.contacts[i]:
@@ -107,7 +121,7 @@ def set_authority(h: HandOver, step: PolicyStep):
     a, m, action = step.inputs, h.memory, step.episode.action
     distance = capture_error(a.state, a.motion, a.com_offset)
     m[CALM] = m[CALM] + 1.0 if is_calm(h, step, distance) else 0.0
-    if distance > h.opens:
+    if distance > m[OPENS]:
         m[OPEN] = 1.0
     elif m[CALM] >= h.calm_steps:
         m[OPEN] = 0.0

@@ -23,7 +23,16 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 
-from .hand_over import AUTHORITY, HandOver, HandOverConfig, WholeStep, whole_tick
+from .hand_over import (
+    AUTHORITY,
+    CLOSES,
+    ENTRIES,
+    OPENS,
+    HandOver,
+    HandOverConfig,
+    WholeStep,
+    whole_tick,
+)
 from .policy_step import PolicyStep
 from .residual import ResidualBalanceEnv
 from .scales import WholeScales, action_term
@@ -76,7 +85,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         self.hand_over = build(HandOverConfig, given, "hand_over")
         prepare("whole")
         self.servo_config = servo_config(servos)
-        self._memory = guarded_zeros(4)
+        self._memory = guarded_zeros(ENTRIES)
         self._callback = Callback(self._begin_anew)
         super().__init__(robot, config, controller=controller, **arguments)
         self.servos = make_servos(self.robot, self.servo_config)
@@ -118,7 +127,9 @@ class ResidualWholeEnv(ResidualBalanceEnv):
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         super()._begin(options)
+        opens, closes = self.hand_over.distances(self.realism)
         self._memory[:] = 0.0
+        self._memory[OPENS], self._memory[CLOSES] = opens**2, closes**2
         self._callback.error = None
 
     def _begin_anew(self) -> None:
@@ -137,8 +148,6 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         """All that a policy step works on, `bound` to the controller."""
         h = self.hand_over
         hand = HandOver(
-            opens=h.opens**2,
-            closes=h.closes**2,
             cos_tilt=float(np.cos(h.tilt)),
             speed=h.speed**2,
             joint_speed=h.joint_speed**2,

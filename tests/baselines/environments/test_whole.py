@@ -15,6 +15,7 @@ from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.envs.balance.episode import FAILURES
 from poise.envs.balance.vector.batch import EnvBatch, replicate
+from poise.envs.sensing.realism import load_realism
 from tests.support.shared import robot
 
 PUSH = {"impulse": 25.0, "direction": 30.0, "duration": 0.1, "start": 0.1, "body": "torso"}
@@ -64,6 +65,25 @@ def test_near_rest_the_controller_is_alone(env):
     np.testing.assert_array_equal(track(env, with_authority(env, 1.0, 0.3), push=[]), quiet)
     pushed = track(env, with_authority(env, 0.0))
     assert abs(track(env, with_authority(env, 1.0, 0.3))[:20] - pushed[:20]).max() > 0.1
+
+
+def test_servos_take_over_sooner_where_the_robot_is_uncertain():
+    """A push too weak for `opens`: at levels of small errors the controller stays, from episode to
+    episode; where joints and tilt may be far off, or arms are moved, servos take over at 1 mm."""
+    env = ResidualWholeEnv(robot(), hand_over={"opens": 0.3, "closes": 0.3, "uncertain": 0.001},
+                           **SHORT)  # fmt: skip
+    weak = {**PUSH, "impulse": 4.0}
+    for level, sooner in (("ideal", False), ("field", True), ("lab", False), ("arms", True),
+                          ("late", False), ("field+arms", True)):  # fmt: skip
+        env.realism = load_realism(level)
+        track(env, with_authority(env, 1.0), steps=20, push=weak)
+        assert (env.authority > 0.0) == sooner, level
+    never = ResidualWholeEnv(robot(), hand_over={"opens": 0.3, "closes": 0.3}, **SHORT)
+    never.realism = load_realism("field")
+    track(never, with_authority(never, 1.0), steps=20, push=weak)
+    assert never.authority == 0.0
+    with pytest.raises(ConfigError, match=r"hand_over: uncertain: must be above 0"):
+        ResidualWholeEnv(robot(), hand_over={"uncertain": 0.0}, **SHORT)
 
 
 @pytest.mark.parametrize("share", [0.3, 1.0])

@@ -190,10 +190,10 @@ def _guarded(name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, o
     if own.action != "whole":
         raise ConfigError(f"{shown(guard.recovery)} moves {own.action!r}, not servos that take "
                           "over (whole)", source=name, field="recovery")  # fmt: skip
+    hand_over = replace(own.hand_over, calm_time=guard.calm_time, uncertain=None)
     env = GuardedEnv(
-        robot, own.env, guard=guard, controller=walker, servos=own.servos,
-        hand_over=replace(own.hand_over, calm_time=guard.calm_time), smoothing=own.smoothing,
-        **overrides,
+        robot, own.env, guard=guard, controller=walker, servos=own.servos, hand_over=hand_over,
+        smoothing=own.smoothing, **overrides,
     )  # fmt: skip
     below = to_yaml(_wherever(walker)).encode()
     content = _hash(to_yaml(guard).encode(), below, to_yaml(own.env).encode(), *policy.content())
