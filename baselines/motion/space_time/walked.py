@@ -16,11 +16,11 @@ from poise.envs.robots.robot import Robot
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST = 0.72  # [h] of a step: further, robots fall
-WALK, WALK_FAST = "walk", "residual-walk-fast"  # a controller, a policy
-STEADY, FASTEST = 0.45, 0.645  # [hω] of a walk by each of them: faster, robots fall
-FAST_ROBOTS = ("humanoid",)  # on which the latter was trained; others fall
-ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, to which it was trained
-BANK, BANK_FAST = 0.07, 0.09  # [g] of speed times turning rate, above which robots fall
+WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
+STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
+FAST_ROBOTS = ("humanoid",)  # for which the others are; others fall
+BANK, LEARNED_BANK = 0.07, 0.0875  # [g] of speed times turning rate, above which robots fall
+ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, that the policy knows
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
@@ -69,14 +69,15 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
     brisk = speed > STEADY * h * omega
     fast = robot.name in FAST_ROBOTS and bool(brisk.any())
-    fast = fast and bool((np.abs(left) <= ASIDE * ahead)[brisk].all())
     fastest = (FASTEST if fast else STEADY) * h * omega
     tempo = min(fastest / max(float(speed.max()), 1e-9), 1.0)
-    bend = float(np.abs(speed * turn).max())
-    most = (BANK_FAST if fast else BANK) * robot.units.gravity
+    bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity
+    ahead_alone = bool((np.abs(left) <= ASIDE * ahead)[brisk].all())
+    learned = fast and ahead_alone and tempo * tempo * bend > most
+    if learned:
+        most = LEARNED_BANK * robot.units.gravity
+        tempo = min(tempo, SPIN * omega / float(np.abs(turn).max()))
     tempo = min(tempo, np.sqrt(most / max(bend, 1e-9)))
-    if fast:
-        tempo = min(tempo, SPIN * omega / max(float(np.abs(turn).max()), 1e-9))
     if tempo < least:
         bound = tempo * speed.max()
         in_curves = " in curves like its own" if bound < 0.999 * fastest else ""
@@ -91,11 +92,12 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
         row[:] = start, ahead[own].mean(), left[own].mean(), turn[own].mean(), period
         rows.append(row)
     commands = faster(np.array(rows), tempo)
-    if fast:
+    if learned:
         commands[:, 4] = 0.0  # it was trained at its gait's own
-        return Walked(commands, tempo, WALK_FAST)
+        return Walked(commands, tempo, LEARNED)
     commands[:, 4] = _swings(commands, h, omega)
-    return Walked(commands, tempo, WALK)
+    quick = np.hypot(commands[:, 1], commands[:, 2]).max() > STEADY * h * omega
+    return Walked(commands, tempo, WALK_FAST if quick else WALK)
 
 
 def _swings(commands: np.ndarray, h: float, omega: float) -> np.ndarray:

@@ -94,6 +94,21 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
     assert other.walker == "walk" and other.tempo < tempo  # whose gains are of no fast walk
 
 
+def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
+    """At the steps of its own gait; other robots are slower instead."""
+    robot, clip = robot_named(HUMANOID), make("run-curve")[0]
+    commands, tempo, walker = find_commands(clip, robot, 0.9)
+    assert walker == "residual-walk-fast" and 0.7 <= tempo < 0.75
+    assert (commands[:, 4] == 0.0).all() and 1.5 < commands[:, 1].max() < 1.6
+    other = find_commands(clip, robot_named("compact"), 0.9)
+    assert other.walker == "walk" and other.tempo < tempo
+    made = retarget_clip(clip, robot)
+    assert made.walker == walker and made.clip.commands is not None
+    trials = follow(reference_from(made.clip, robot, "run-curve"), walker, starts=2)
+    assert not any(trial.fallen for trial in trials)
+    assert all(0.8 < trial.walked < 1.1 and 0.9 < trial.turned < 1.2 for trial in trials)
+
+
 def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
     robot = robot_named(HUMANOID)
     with pytest.raises(
