@@ -79,10 +79,8 @@ class HandOver(Block):
     speed: float  # squared [m²/s²]
     joint_speed: float  # mean square [rad²/s²]
     calm_steps: float  # policy steps
-    memory: (
-        np.ndarray
-    )  # (6,) may take over, calm steps in a row, authority w, took over; the squares
-    # of the distances that open and close [m²]
+    memory: np.ndarray  # (6,) may take over, calm steps in a row, authority w, took over, and the
+    # squares of the distances that open and close [m²]
     begin: CallbackAddress  # begins a new trial of the controller
 
 

@@ -61,9 +61,8 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     """The text names what was asked for and what there is."""
     with pytest.raises(
         ConfigError,
-        match="momentum-qp, .*residual-walk, residual-walk-fast, "
-        "residual-walk-field, residual-whole-g1, "
-        "residual-whole-g1-field, guard-falcon-g1, guard-g1, zero",
+        match="momentum-qp, .*residual-walk, residual-walk-fast, residual-walk-field, "
+        "residual-whole-g1, residual-whole-g1-field, guard-falcon-g1, guard-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
@@ -98,7 +97,7 @@ def test_a_packaged_policy_is_known_by_its_folder(
     others += [f"residual-whole-g1{where}" for where in ("", "-field")]
     assert packaged("policies") == [*names, *others]
     assert default_controllers()[-8:] == tuple(names)
-    assert default_controllers("unitree_g1")[-2:] == tuple(others[2:])
+    assert default_controllers("unitree_g1")[-2:] == tuple(others[3:])
     guards = packaged("guards")
     with pytest.raises(ConfigError, match=", ".join([*names, *others, *guards, "zero"])):
         load_agent("residual-abe07", robot)
@@ -131,7 +130,7 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     if found.action != "residual":
         steps = "residual-torque" if found.step_residual.torque > 0.0 else "residual-step"
         others = {"torque": "ppo-torque", "step": steps, "whole": "residual-whole-g1"}
-        others |= {"walk": "residual-walk", "position": "ppo-position"}
+        others |= {"walk": f"residual-{found.controller}", "position": "ppo-position"}
         level = "" if found.env.realism.ideal else f"-{found.env.realism.name}"
         assert name == f"{others[found.action]}{level}"
     else:
