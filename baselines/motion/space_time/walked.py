@@ -67,13 +67,13 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
-    brisk = speed > STEADY * h * omega
-    fast = robot.name in FAST_ROBOTS and bool(brisk.any())
+    fast = robot.name in FAST_ROBOTS
     fastest = (FASTEST if fast else STEADY) * h * omega
     tempo = min(fastest / max(float(speed.max()), 1e-9), 1.0)
     bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity
-    ahead_alone = bool((np.abs(left) <= ASIDE * ahead)[brisk].all())
-    learned = fast and ahead_alone and tempo * tempo * bend > most
+    brisk = speed > STEADY * h * omega
+    known = brisk.any() and (np.abs(left) <= ASIDE * ahead)[brisk].all()
+    learned = bool(fast and known and tempo * tempo * bend > most)
     if learned:
         most = LEARNED_BANK * robot.units.gravity
         tempo = min(tempo, SPIN * omega / float(np.abs(turn).max()))
