@@ -155,6 +155,12 @@ def command_followed(v: RewardView) -> float:
 
 
 @compiled
+def pace_kept(v: RewardView) -> float:
+    x, y, near = v.velocity_error[0], v.velocity_error[1], 0.3 * v.scales.velocity
+    return np.exp(-(x * x + y * y) / near**2)
+
+
+@compiled
 def fall_cost(v: RewardView) -> float:
     return -1.0
 
@@ -214,6 +220,11 @@ class RewardWeights:
     tracking: float = _term(
         0.0, command_followed,
         "exp(−(|Δv| / 0.02 ω h)² − (Δψ̇ / 0.05 ω)²), of a walk's last stride from its command",
+        "no fall",
+    )  # fmt: skip
+    pace: float = _term(
+        0.0, pace_kept,
+        "exp(−(|Δv| / 0.06 ω h)²), which still tells a walk that is far too slow to go faster",
         "no fall",
     )  # fmt: skip
 
