@@ -8,7 +8,7 @@ docs/motions.md), and the ten that `tests.support.captures` makes. Each is impor
 does it, and followed as `poise motion follow --seed 21` by what the import names where a planner
 walks it (`walk`, `walk-fast` or `residual-walk-fast`), else by `motion-step`. Its speed is its way
 times its tempo, as shares of the clip's; where it walks, `reached` is that times the way that it
-went over the way that it was told, mean. `caught` is how often the planner of steps took over in a
+went over the clip's, mean. `caught` is how often the planner of steps took over in a
 trial, mean. Bar: 80 % at 0.7 of their speed without a fall.
 """
 
@@ -79,7 +79,7 @@ def judge(path: Path, starts: int, seed: int, folder: Path) -> Row:
     write_robot_clip(made.clip, file)
     trials = follow(file, made.walker or "motion-step", starts=starts, seed=seed)
     caught = float(np.nan_to_num(np.mean([trial.interruptions for trial in trials])))
-    went = float(np.mean([trial.walked for trial in trials]))
+    went = made.asked * float(np.mean([trial.walked for trial in trials]))
     falls = sum(trial.fallen for trial in trials)
     return row._replace(falls=falls, caught=caught, went=1.0 if np.isnan(went) else went)
 

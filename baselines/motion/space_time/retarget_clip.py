@@ -58,6 +58,7 @@ class RetargetedClip(NamedTuple):
         tempo: how many times as fast as the clip it is.
         walker: the packaged controller or policy that performs it by walking; empty where none is
             needed.
+        asked: how many times the clip's speed at that tempo the walker is told, since it is slower.
         flight: share of the time that the clip is in the air.
         bound: as of `Retargeted`.
     """
@@ -73,6 +74,7 @@ class RetargetedClip(NamedTuple):
     flight: float = 1.0
     bound: str = ""
     walker: str = ""
+    asked: float = 1.0
 
 
 def retarget_clip(
@@ -114,11 +116,11 @@ def retarget_clip(
             reason = _climb(clip) or error.message
             if asked or error.field not in UNPERFORMED:
                 raise
-    free, tempo, walker = retarget_freely(clip, robot, smooth=smooth), 1.0, ""
+    free, tempo, walker, asked = retarget_freely(clip, robot, smooth=smooth), 1.0, "", 1.0
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
-            commands, tempo, name = find_commands(clip, robot, free.scale, ENOUGH)
+            commands, tempo, name, asked = find_commands(clip, robot, free.scale, ENOUGH)
             walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
             reference_from(walks, robot, clip.name)
             seen, walker = walks, name
@@ -127,7 +129,8 @@ def retarget_clip(
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
     made = _stepped(free._replace(clip=seen), scene)
-    return made._replace(tempo=tempo, walker=walker, stride=1.0 if walker else made.stride)
+    stride = 1.0 if walker else made.stride
+    return made._replace(tempo=tempo, walker=walker, stride=stride, asked=asked)
 
 
 def _climb(clip: Clip) -> str:

@@ -18,6 +18,8 @@ TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
+REACHES = 0.47  # [hω] that `walk-fast` gets to, whatever it is told
+ASKED, MOST_ASKED = 1.08, 0.62  # more than a clip's speed is told to the policy, [hω] at most
 FAST_ROBOTS = ("humanoid",)  # for which the others are; others fall
 BANK, LEARNED_BANK = 0.07, 0.0875  # [g] of speed times turning rate, above which robots fall
 ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, that the policy knows
@@ -30,12 +32,13 @@ BOTH = 0.13  # [1/ω] that planners stand on both feet between two swings
 
 
 class Walked(NamedTuple):
-    """Commands (n, 5) in the clip's time, how many times as fast as the clip that is, and the
-    packaged controller or policy that walks so."""
+    """Commands (n, 5) in the clip's time, how many times as fast as the clip that is, the packaged
+    controller or policy that walks so, and how many times that speed it is told, being slower."""
 
     commands: np.ndarray
     tempo: float
     walker: str
+    asked: float = 1.0
 
 
 def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) -> Walked:
@@ -47,8 +50,8 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     run is walked.
 
     Raises:
-        ConfigError: both feet leave the ground at once; it takes no two steps, goes nowhere, or is
-            walked at less than `least` of its speed.
+        ConfigError: both feet leave the ground at once; it takes no two steps, goes nowhere, or a
+            robot reaches less than `least` of its speed.
     """
     planted = measure_contacts(clip).planted
     run = _run(clip, planted)
@@ -73,10 +76,14 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity
     brisk = speed > STEADY * h * omega
     known = brisk.any() and (np.abs(left) <= ASIDE * ahead)[brisk].all()
-    learned = bool(fast and known and tempo * tempo * bend > most)
+    sharp = tempo * tempo * bend > most or tempo * speed.max() > REACHES * h * omega
+    learned = bool(fast and known and sharp)
     if learned:
         most = LEARNED_BANK * robot.units.gravity
-        tempo = min(tempo, SPIN * omega / float(np.abs(turn).max()))
+        tempo = min(tempo, SPIN * omega / max(float(np.abs(turn).max()), 1e-9))
+    elif fast:
+        fastest = REACHES * h * omega
+        tempo = min(tempo, fastest / max(float(speed.max()), 1e-9))
     tempo = min(tempo, np.sqrt(most / max(bend, 1e-9)))
     if tempo < least:
         bound = tempo * speed.max()
@@ -94,7 +101,10 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     commands = faster(np.array(rows), tempo)
     if learned:
         commands[:, 4] = 0.0  # it was trained at its gait's own
-        return Walked(commands, tempo, LEARNED)
+        going = float(np.hypot(commands[:, 1], commands[:, 2]).max())
+        asked = min(ASKED, MOST_ASKED * h * omega / going)
+        commands[:, 1:3] *= asked
+        return Walked(commands, tempo, LEARNED, asked)
     commands[:, 4] = _swings(commands, h, omega)
     quick = np.hypot(commands[:, 1], commands[:, 2]).max() > STEADY * h * omega
     return Walked(commands, tempo, WALK_FAST if quick else WALK)
