@@ -20,7 +20,7 @@ STILL = 1e-6  # [rad, m] by which a posture that is held may change
 START, AHEAD, LEFT, TURN, STEP_TIME, COLUMNS = 0, 1, 2, 3, 4, 5
 MOST_COMMANDS = 200  # rows
 SHIFT, END = 0.7, 1.5  # [s] in which the weight shifts to the first foot; and to stand at the end
-RAMP, TURN_RAMP = 0.02, 0.08  # [g], [ω²] by which a planner gets to what it is told
+RAMP, TURN_RAMP = 0.015, 0.08  # [g], [ω²] by which a planner gets to what it is told
 
 
 class MotionSample(NamedTuple):

@@ -145,6 +145,16 @@ def test_tracking_a_command():
     assert e.reward_terms[REWARD_TERMS.index("tracking")] == pytest.approx(expected)
 
 
+def test_pace_tells_from_afar_how_far_a_walk_is_from_its_command():
+    """exp(−(|Δv| / 0.06 ω h)²), where tracking is zero, and whatever the turn."""
+    simulation, r = generic_state(), robot()
+    way = 0.06 * np.sqrt(9.81 / r.height_com) * r.height_com
+    weights = RewardWeights(tracking=2.0, pace=3.0)
+    _, e = play(simulation, weights=weights, velocity_error=(0.6 * way, -0.8 * way, 9.0))
+    assert e.reward_terms[REWARD_TERMS.index("pace")] == pytest.approx(3.0 * np.exp(-1.0))
+    assert e.reward_terms[REWARD_TERMS.index("tracking")] < 1e-3
+
+
 def test_a_fall_costs_its_weight_and_earns_nothing():
     """In the step of the fall the positive terms are zero."""
     simulation = generic_state()

@@ -58,8 +58,8 @@ def test_a_curve_is_told_as_one_from_begin_to_end(name: str) -> None:
     """A course that goes on straight beyond its ends leads aside there, and chords are short."""
     robot = robot_named(HUMANOID)
     ahead, turn = {"circle": (0.7, 0.95), "run-curve": (2.4, 0.8)}[name]
-    commands, tempo, *_ = find_commands(make(name)[0], robot, 0.9)
-    assert commands[:, 1] == pytest.approx(tempo * 0.9 * ahead, rel=0.01)
+    commands, tempo, _, asked = find_commands(make(name)[0], robot, 0.9)
+    assert commands[:, 1] == pytest.approx(asked * tempo * 0.9 * ahead, rel=0.01)
     assert commands[:, 2] == pytest.approx(0.0, abs=0.01)
     assert commands[:, 3] == pytest.approx(tempo * turn, rel=0.01)
 
@@ -86,9 +86,9 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
     """By the controller that reaches it; the policy is told more than it reaches."""
     robot, h_omega = robot_named(HUMANOID), 2.779
     commands, tempo, walker, asked = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
-    assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.08
+    assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.09
     assert commands[:, 1] == pytest.approx(asked * tempo * 1.9 * 1.2 * 0.9, abs=0.06)
-    assert commands[:, 1].max() <= 0.62 * h_omega + 1e-3
+    assert commands[:, 1].max() <= 0.64 * h_omega + 1e-3
     assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.9 / tempo, rel=0.3)
     with pytest.raises(ConfigError, match=r"at 1\.6\d m/s at most, 0\.\d\d of it") as refused:
         find_commands(make("walk")[0].at_speed(1.9), robot, 0.9, least=tempo + 0.01)
