@@ -79,9 +79,10 @@ def judge(path: Path, starts: int, seed: int, folder: Path) -> Row:
     write_robot_clip(made.clip, file)
     trials = follow(file, made.walker or "motion-step", starts=starts, seed=seed)
     caught = float(np.nan_to_num(np.mean([trial.interruptions for trial in trials])))
-    went = made.asked * float(np.mean([trial.walked for trial in trials]))
+    walked = np.array([trial.walked for trial in trials])  # NaN: falls before the clip begins
+    went = 1.0 if np.isnan(walked).all() else made.asked * float(np.nan_to_num(walked).mean())
     falls = sum(trial.fallen for trial in trials)
-    return row._replace(falls=falls, caught=caught, went=1.0 if np.isnan(went) else went)
+    return row._replace(falls=falls, caught=caught, went=went)
 
 
 def main() -> None:
