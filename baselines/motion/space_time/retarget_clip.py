@@ -116,11 +116,11 @@ def retarget_clip(
             reason = _climb(clip) or error.message
             if asked or error.field not in UNPERFORMED:
                 raise
-    free, tempo, walker, asked = retarget_freely(clip, robot, smooth=smooth), 1.0, "", 1.0
+    free, tempo, walker, told = retarget_freely(clip, robot, smooth=smooth), 1.0, "", 1.0
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
-            commands, tempo, name, asked = find_commands(clip, robot, free.scale, ENOUGH)
+            commands, tempo, name, told = find_commands(clip, robot, free.scale, ENOUGH)
             walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
             reference_from(walks, robot, clip.name)
             seen, walker = walks, name
@@ -130,7 +130,7 @@ def retarget_clip(
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
     made = _stepped(free._replace(clip=seen), scene)
     stride = 1.0 if walker else made.stride
-    return made._replace(tempo=tempo, walker=walker, stride=stride, asked=asked)
+    return made._replace(tempo=tempo, walker=walker, stride=stride, asked=told)
 
 
 def _climb(clip: Clip) -> str:
