@@ -8,8 +8,8 @@ docs/motions.md), and the ten that `tests.support.captures` makes. Each is impor
 does it, and followed as `poise motion follow --seed 21` by what the import names where a planner
 walks it (`walk`, `walk-fast` or `residual-walk-fast`), else by `motion-step`. Its speed is its way
 times its tempo, as shares of the clip's; where it walks, `reached` is that times the way that it
-went over the clip's, mean. `caught` is how often the planner of steps took over in a
-trial, mean. Bar: 80 % at 0.7 of their speed without a fall.
+went over the clip's, mean. `caught` is how often the planner of steps took over in a trial, mean.
+Bar: 80 % at 0.7 of their speed without a fall.
 """
 
 from __future__ import annotations

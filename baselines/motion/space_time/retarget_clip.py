@@ -120,10 +120,10 @@ def retarget_clip(
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
-            commands, tempo, name, told = find_commands(clip, robot, free.scale, ENOUGH)
+            commands, tempo, name, more = find_commands(clip, robot, free.scale, ENOUGH)
             walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
             reference_from(walks, robot, clip.name)
-            seen, walker = walks, name
+            seen, walker, told = walks, name, more
         except ConfigError as error:
             if error.field == "speed":
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))

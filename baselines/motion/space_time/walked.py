@@ -19,7 +19,7 @@ LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
 REACHES = 0.47  # [hω] that `walk-fast` gets to, whatever it is told
-ASKED, MOST_ASKED = 1.07, 0.63  # more than a clip's speed is told to the policy, [hω] at most
+ASKED = 1.07  # times a clip's speed is told to the policy at most, which is slower than told
 FAST_ROBOTS = ("humanoid",)  # for which the others are; others fall
 BANK, LEARNED_BANK = 0.07, 0.0875  # [g] of speed times turning rate, above which robots fall
 ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, that the policy knows
@@ -101,9 +101,8 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     commands = faster(np.array(rows), tempo)
     if learned:
         commands[:, 4] = 0.0  # it was trained at its gait's own
-        going = float(np.hypot(commands[:, 1], commands[:, 2]).max())
         bent = float(np.abs(commands[:, 1] * commands[:, 3]).max())
-        asked = max(min(ASKED, MOST_ASKED * h * omega / going, most / max(bent, 1e-9)), 1.0)
+        asked = max(min(ASKED, most / max(bent, 1e-9)), 1.0)
         commands[:, 1:3] *= asked
         return Walked(commands, tempo, LEARNED, asked)
     commands[:, 4] = _swings(commands, h, omega)

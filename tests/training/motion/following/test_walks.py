@@ -86,9 +86,9 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
     """By the controller that reaches it; the policy is told more than it reaches."""
     robot, h_omega = robot_named(HUMANOID), 2.779
     commands, tempo, walker, asked = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
-    assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.09
+    assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.07
     assert commands[:, 1] == pytest.approx(asked * tempo * 1.9 * 1.2 * 0.9, abs=0.06)
-    assert commands[:, 1].max() <= 0.64 * h_omega + 1e-3
+    assert commands[:, 1].max() <= 1.07 * 0.585 * h_omega + 1e-3
     assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.9 / tempo, rel=0.3)
     with pytest.raises(ConfigError, match=r"at 1\.6\d m/s at most, 0\.\d\d of it") as refused:
         find_commands(make("walk")[0].at_speed(1.9), robot, 0.9, least=tempo + 0.01)
@@ -133,7 +133,9 @@ def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
     )
 
 
-@pytest.mark.parametrize(("speed", "walker"), [(0.48, "walk"), (0.495, "walk-fast")])
+@pytest.mark.parametrize(
+    ("speed", "walker"), [(0.48, "walk"), (0.495, "walk-fast"), (0.6, "residual-walk-fast")]
+)
 def test_a_slow_run_is_walked_without_a_fall(speed: float, walker: str) -> None:
     made = retarget_clip(make("run")[0].at_speed(speed), robot_named(HUMANOID))
     assert 0.7 < made.tempo <= 1.0 and made.clip.commands is not None
