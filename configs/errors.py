@@ -107,6 +107,19 @@ def _listed(choices: tuple[str, ...]) -> str:
 
 
 @contextmanager
+def naming(source: str | Path | None = None, field: str | None = None) -> Iterator[None]:
+    """Let a `ConfigError` that names no source name this one, and this field if it has none."""
+    try:
+        yield
+    except ConfigError as error:
+        if error.source is not None:
+            raise
+        raise ConfigError(
+            error.message, source=source, field=error.field or field, choices=error.choices
+        ) from None
+
+
+@contextmanager
 def below(*fields: str) -> Iterator[None]:
     """Let an error of a part name its whole: `fields` come before the field of a `ConfigError`."""
     try:

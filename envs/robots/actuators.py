@@ -12,7 +12,7 @@ JOINT_TRANSMISSIONS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_J
 SIMPLE_JOINTS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 
 
-def model_torque_limits(model: mujoco.MjModel, source: str) -> dict[str, float]:
+def model_torque_limits(model: mujoco.MjModel) -> dict[str, float]:
     """Joint name → the largest torque [N·m] that the model's own limits let its actuators make.
 
     The smallest of the bounds that apply: ``actuatorfrcrange`` of the joint; ``forcerange`` of an
@@ -33,7 +33,6 @@ def model_torque_limits(model: mujoco.MjModel, source: str) -> dict[str, float]:
         ):
             raise ConfigError(
                 f"actuator {model.actuator(i).name!r} drives no hinge or slide joint",
-                source=source,
                 field="source",
             )
         name = model.joint(joint).name
@@ -48,34 +47,28 @@ def model_torque_limits(model: mujoco.MjModel, source: str) -> dict[str, float]:
     return limits
 
 
-def install_motors(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, overrides: dict[str, float], source: str
-) -> None:
+def install_motors(spec: mujoco.MjSpec, model: mujoco.MjModel, overrides: dict[str, float]) -> None:
     """Replace all actuators by one motor of gear 1 per driven joint, in the order of the joints.
 
     Args:
         spec: changed in place.
         model: the spec compiled, all joints named.
         overrides: joint name or pattern → limit [N·m]; wins over the model's limits.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: nothing bounds the torque of a joint, or no joint is driven.
     """
     joints = [model.joint(i).name for i in range(model.njnt) if model.jnt_type[i] in SIMPLE_JOINTS]
-    limits = model_torque_limits(model, source)
-    limits |= match_names(overrides, joints, source, "torque_limits")
+    limits = model_torque_limits(model) | match_names(overrides, joints, None, "torque_limits")
     unlimited = [name for name, limit in limits.items() if not 0 < limit < np.inf]
     if unlimited:
         raise ConfigError(
             f"no torque limit in the model for {', '.join(unlimited)}; give one in N·m",
-            source=source,
             field="torque_limits",
         )
     if not limits:
         raise ConfigError(
             "the model has no actuators; give torque limits in N·m",
-            source=source,
             field="torque_limits",
             choices=joints,
         )
@@ -106,19 +99,18 @@ def proposed_armature(limit: float, mass: float) -> float:
     return float(f"{min(3e-4 * limit, 5e-4 * mass):.1e}")
 
 
-def set_passive(spec: mujoco.MjSpec, description: RobotDescription, source: str) -> None:
+def set_passive(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     """Give joints the armature, damping and friction of the description, which win.
 
     Raises:
         ConfigError: a pattern matches no hinge or slide joint.
     """
     joints = [joint.name for joint in spec.joints if joint.type in SIMPLE_JOINTS]
-    for name, value in match_names(description.armature, joints, source, "armature").items():
+    for name, value in match_names(description.armature, joints, None, "armature").items():
         spec.joint(name).armature = value
-    for name, value in match_names(description.damping, joints, source, "damping").items():
+    for name, value in match_names(description.damping, joints, None, "damping").items():
         spec.joint(name).damping[0] = value
-    loss = match_names(description.frictionloss, joints, source, "frictionloss")
-    for name, value in loss.items():
+    for name, value in match_names(description.frictionloss, joints, None, "frictionloss").items():
         spec.joint(name).frictionloss = value
 
 

@@ -153,7 +153,7 @@ class RobotDescription:
 
 
 def match_names(
-    patterns: dict[str, Value], names: list[str], source: str, field: str
+    patterns: dict[str, Value], names: list[str], source: str | None, field: str
 ) -> dict[str, Value]:
     """The value for each name that is a key of ``patterns`` or matches one (shell wildcards).
 

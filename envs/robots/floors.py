@@ -15,7 +15,7 @@ ALL_BITS = 0x7FFFFFFF  # of contype and conaffinity: touches everything that col
 
 
 def install_ground(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, name: str | None, source: str
+    spec: mujoco.MjSpec, model: mujoco.MjModel, name: str | None
 ) -> tuple[str, list[str]]:
     """The name of the ground plane, and what was changed for it.
 
@@ -27,7 +27,6 @@ def install_ground(
         model: the spec compiled.
         name: a floor of the model, or how to call a new one; None takes the model's first plane
             that collides with anything, else the level box below the origin.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: the model has floors but none with this name.
@@ -37,11 +36,8 @@ def install_ground(
     below = [geom for geom in floors if _covers(model, geom.id)]
     chosen = [geom for geom in floors if geom.name == name] if name else planes or below[:1]
     if not chosen and name is not None and (planes or below):
-        names = [geom.name for geom in floors]
-        raise ConfigError(
-            f"the model has no plane and no level box {shown(name)}",
-            source=source, field="ground", choices=names,
-        )  # fmt: skip
+        problem = f"the model has no plane and no level box {shown(name)}"
+        raise ConfigError(problem, field="ground", choices=[geom.name for geom in floors])
     if not chosen:
         _add_ground(spec, name or GROUND)
         return name or GROUND, []
@@ -133,18 +129,17 @@ def _lower(spec: mujoco.MjSpec, model: mujoco.MjModel, height: float) -> None:
             body.pos[2] -= height
 
 
-def check_ground(model: mujoco.MjModel, ground: int, source: str) -> None:
+def check_ground(model: mujoco.MjModel, ground: int) -> None:
     """Raise ConfigError unless the ground is a level plane."""
     if not _level(model, ground):
         raise ConfigError(
             f"the plane {model.geom(ground).name!r} must be z = 0, level: it slopes; name another "
             "floor, or leave it out of the model",
-            source=source,
             field="ground",
         )
 
 
-def check_scenery(model: mujoco.MjModel, data: mujoco.MjData, ground: int, source: str) -> None:
+def check_scenery(model: mujoco.MjModel, data: mujoco.MjData, ground: int) -> None:
     """Raise ConfigError if the robot, where it is to stand, touches another part of the world than
     the ground: its contacts would count for nothing, or throw it."""
     mujoco.mj_collision(model, data)
@@ -161,7 +156,6 @@ def check_scenery(model: mujoco.MjModel, data: mujoco.MjData, ground: int, sourc
                 f"{geom.name or 'a geom without a name'!r} ({_kind(model, fixed[0])}), "
                 f"{-1000.0 * contact.dist:.0f} mm deep: {advice}, or name the robot's own file "
                 "instead of a scene",
-                source=source,
                 field="ground",
             )
 

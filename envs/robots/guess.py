@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, naming
 
 from .actuators import SIMPLE_JOINTS, model_torque_limits, proposed_armature
 from .description import (
@@ -52,25 +52,22 @@ def guess(path: Path) -> RobotDescription:
         ConfigError: the file cannot be read, or one of these is not sure; the text says which, and
             that a description names it.
     """
-    source = str(path)
     urdf = path.suffix.lower() == ".urdf"
-    spec = read_urdf(path, source) if urdf else read_mjcf(path, (), source)
-    for i, joint in enumerate(spec.joints):
-        joint.name = joint.name or f"joint{i}"
-    keyframes = {}
-    try:
-        model = spec.compile()
-        keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
-        ground, _ = install_ground(spec, model, None, source)
-        model = spec.compile()
-    except ValueError as error:
-        raise ConfigError(
-            f"the model does not compile: {error}", source=source, field="source"
-        ) from None
-    check_ground(model, model.geom(ground).id, source)
-    with pointing_to_scenes(path, "pair"):
-        found = _Guess(model, model.geom(ground).id, keyframes, source)
-    return found.description(path, urdf)
+    with naming(path):
+        spec = read_urdf(path) if urdf else read_mjcf(path, ())
+        for i, joint in enumerate(spec.joints):
+            joint.name = joint.name or f"joint{i}"
+        try:
+            model = spec.compile()
+            keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
+            ground, _ = install_ground(spec, model, None)
+            model = spec.compile()
+        except ValueError as error:
+            raise ConfigError(f"the model does not compile: {error}", field="source") from None
+        check_ground(model, model.geom(ground).id)
+        with pointing_to_scenes(path, "pair"):
+            found = _Guess(model, model.geom(ground).id, keyframes)
+        return found.description(path, urdf)
 
 
 def robot_name(path: Path) -> str:
@@ -83,11 +80,9 @@ def robot_name(path: Path) -> str:
 class _Guess:
     """A model, and what is found of it in its zero posture."""
 
-    def __init__(
-        self, model: mujoco.MjModel, ground: int, keyframes: dict[str, np.ndarray], source: str
-    ):
+    def __init__(self, model: mujoco.MjModel, ground: int, keyframes: dict[str, np.ndarray]):
         self.model, self.ground, self.keyframes = model, ground, keyframes
-        self.source, self.data = source, mujoco.MjData(model)
+        self.data = mujoco.MjData(model)
         mujoco.mj_forward(model, self.data)
         self.root = self._root()
         self.feet = self._feet()
@@ -122,14 +117,14 @@ class _Guess:
         if stand:
             return stand[0]
         raise _unsure("no posture stands with both soles flat and the CoM over their middle; the "
-                      f"first that was tried: {reasons[0]}", "posture", self.source)  # fmt: skip
+                      f"first that was tried: {reasons[0]}", "posture")  # fmt: skip
 
     def _root(self) -> int:
         model = self.model
         free = [int(model.jnt_bodyid[i]) for i in range(model.njnt)
                 if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_FREE]  # fmt: skip
         if not free:
-            raise _unsure("no body floats by a free joint", "root", self.source)
+            raise _unsure("no body floats by a free joint", "root")
         return max(free, key=lambda body: np.count_nonzero(model.body_rootid == body))
 
     def _feet(self) -> tuple[int, int]:
@@ -142,11 +137,10 @@ class _Guess:
         lowest = [(z, body) for z, body in lowest if np.isfinite(z)]
         height = self._height()
         if len(lowest) < 2 or lowest[1][0] - lowest[0][0] > ALIKE * height:
-            raise _unsure("no two limbs that collide with the ground end equally low", "feet",
-                          self.source)  # fmt: skip
+            raise _unsure("no two limbs that collide with the ground end equally low", "feet")
         if len(lowest) > 2 and lowest[2][0] - lowest[0][0] < HIGHER * height:
             names = ", ".join(model.body(body).name for _, body in lowest[:6])
-            raise _unsure(f"more than two limbs end low: {names}", "feet", self.source)
+            raise _unsure(f"more than two limbs end low: {names}", "feet")
         first, second = lowest[0][1], lowest[1][1]
         sides = _side(model.body(first).name), _side(model.body(second).name)
         if sides == ("right", "left") or (
@@ -190,7 +184,7 @@ class _Guess:
         left, right = (self.data.xpos[foot] for foot in self.feet)
         across = np.cross(left - right, [0.0, 0.0, 1.0])
         if np.linalg.norm(across) < 1e-3:
-            raise _unsure("the feet are not beside each other", "forward", self.source)
+            raise _unsure("the feet are not beside each other", "forward")
         sides = {_side(self.model.body(foot).name) for foot in self.feet}
         if sides != {"left", "right"} and self._toes() @ across < 0.0:
             across = -across
@@ -256,7 +250,7 @@ class _Guess:
         """What is proposed for the motors whose joints have none."""
         model = self.model
         mass = float(model.body_subtreemass[self.root])
-        limits = model_torque_limits(model, self.source)
+        limits = model_torque_limits(model)
         return {name: proposed_armature(limit, mass) for name, limit in limits.items()
                 if np.isfinite(limit) and limit > 0.0
                 and model.dof_armature[model.joint(name).dofadr[0]] == 0.0}  # fmt: skip
@@ -264,14 +258,14 @@ class _Guess:
     def _touching(self, description: RobotDescription) -> bool:
         """Whether bodies are in each other in the posture; ConfigError where it does not stand."""
         model, data = self.model, mujoco.MjData(self.model)
-        data.qpos[:] = described_qpos(model, description, self.keyframes, self.source)
+        data.qpos[:] = described_qpos(model, description, self.keyframes)
         mujoco.mj_kinematics(model, data)
         planes = []
-        for i, foot in enumerate(self.feet):
-            geoms = sole_geoms(model, foot, (), self.ground, self.source, f"feet[{i}]")
-            planes.append(find_sole_plane(model, data, foot, geoms, self.source, f"feet[{i}]"))
-        level_soles(model, data, self.feet, planes, self.source)
-        centre_com(model, data, self.root, self.feet, planes, self.source)
+        for foot in self.feet:
+            geoms = sole_geoms(model, foot, (), self.ground)
+            planes.append(find_sole_plane(model, data, foot, geoms))
+        level_soles(model, data, self.feet, planes)
+        centre_com(model, data, self.root, self.feet, planes)
         mujoco.mj_collision(model, data)
         return any(
             contact.dist < -DEEP and all(model.geom_bodyid[geom] for geom in contact.geom)
@@ -286,9 +280,7 @@ def _side(name: str) -> str:
     return {"l": "left", "r": "right"}.get(word, word)
 
 
-def _unsure(problem: str, field: str, source: str) -> ConfigError:
+def _unsure(problem: str, field: str) -> ConfigError:
     return ConfigError(
-        f"{problem}: write a description (.yaml) that says it, see docs/robots.md",
-        source=source,
-        field=field,
+        f"{problem}: write a description (.yaml) that says it, see docs/robots.md", field=field
     )

@@ -15,30 +15,29 @@ ITERATIONS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iteration
               "sdf_iterations", "sdf_initpoints")  # fmt: skip
 
 
-def check_numbers(model: mujoco.MjModel, dynamics: tuple[str, ...], source: str) -> None:
+def check_numbers(model: mujoco.MjModel, dynamics: tuple[str, ...]) -> None:
     """Raise ConfigError for numbers of the model that are not finite, and for options that no
     robot stands with: another gravity than down, endless iterations.
 
     Args:
         model: compiled.
         dynamics: names of the arrays that its motion depends on, which must not be huge either.
-        source: the description file, for errors.
     """
     for name in (each for each in dir(model) if not each.startswith("_")):
         value = getattr(model, name)
         if isinstance(value, np.ndarray) and value.dtype.kind == "f":
             largest = LARGEST if name in dynamics else np.inf
             if not np.all(np.isfinite(value) & (np.abs(value) <= largest)):
-                raise _wrong(f"{name} of the model must be finite and at most {LARGEST:g}", source)
+                raise _wrong(f"{name} of the model must be finite and at most {LARGEST:g}")
     gravity = model.opt.gravity
     if not (np.all(gravity[:2] == 0.0) and 0.01 <= -gravity[2] <= 1000.0):
-        raise _wrong(f"gravity must point down, 0.01 to 1000 m/s², not {gravity}", source)
+        raise _wrong(f"gravity must point down, 0.01 to 1000 m/s², not {gravity}")
     for name in ITERATIONS:
         if getattr(model.opt, name, 0) > MOST_ITERATIONS:
-            raise _wrong(f"{name} must be at most {MOST_ITERATIONS}", source)
+            raise _wrong(f"{name} must be at most {MOST_ITERATIONS}")
 
 
-def check_bodies(model: mujoco.MjModel, description: RobotDescription, source: str) -> None:
+def check_bodies(model: mujoco.MjModel, description: RobotDescription) -> None:
     """Raise ConfigError unless the root floats, it alone moves, all other joints are simple, and
     the feet hang on it. The text says what mends it."""
     bodies = {model.body(i).name: i for i in range(1, model.nbody)}
@@ -46,15 +45,13 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription, source: s
     named |= {f"feet[{i}].body": foot.body for i, foot in enumerate(description.feet)}
     for field, name in named.items():
         if name not in bodies:
-            raise ConfigError(
-                f"the model has no body {shown(name)}", source=source, field=field, choices=bodies
-            )
-    _check_root(model, bodies[description.root], source)
+            raise ConfigError(f"the model has no body {shown(name)}", field=field, choices=bodies)
+    _check_root(model, bodies[description.root])
     if int(mujoco.mjtJoint.mjJNT_BALL) in model.jnt_type:
-        raise _wrong("ball joints are not supported", source)
+        raise _wrong("ball joints are not supported")
     loops = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
     if any(kind in loops for kind in model.eq_type[model.eq_active0.astype(bool)]):
-        raise _wrong("closed kinematic loops (connect, weld) are not supported", source)
+        raise _wrong("closed kinematic loops (connect, weld) are not supported")
     for field, name in list(named.items())[1:]:
         body, joints = bodies[name], 0
         while body != bodies[description.root] and body != 0:
@@ -62,13 +59,11 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription, source: s
             body = model.body_parentid[body]
         if body == 0 or not joints:
             raise ConfigError(
-                f"the body {shown(name)} is no limb of the root {description.root!r}",
-                source=source,
-                field=field,
+                f"the body {shown(name)} is no limb of the root {description.root!r}", field=field
             )
 
 
-def _check_root(model: mujoco.MjModel, root: int, source: str) -> None:
+def _check_root(model: mujoco.MjModel, root: int) -> None:
     """The root hangs on the world by a free joint, and nothing else moves."""
     name, top = model.body(root).name, int(model.body_rootid[root])
     bodies = [root, *_ancestors(model, root)]
@@ -95,7 +90,7 @@ def _check_root(model: mujoco.MjModel, root: int, source: str) -> None:
                    f"{', '.join(map(repr, trees))} ({_named(model, others)}): leave them out, or "
                    "name the robot's own file instead of a scene")  # fmt: skip
         floating = []
-    raise ConfigError(problem, source=source, field="root", choices=floating or None)
+    raise ConfigError(problem, field="root", choices=floating or None)
 
 
 def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
@@ -114,16 +109,14 @@ def _named(model: mujoco.MjModel, joints: list[int]) -> str:
     return ", ".join(names) + (f" and {len(joints) - 6} more" if len(joints) > 6 else "")
 
 
-def check_standing(data: mujoco.MjData, root: int, source: str) -> None:
+def check_standing(data: mujoco.MjData, root: int) -> None:
     """Raise ConfigError unless the centre of mass is above the ground in the standing posture."""
     height = data.subtree_com[root, 2]
     if not 0.0 < height < np.inf:
         raise ConfigError(
-            f"the centre of mass would be at {height:g} m, not above the ground",
-            source=source,
-            field="posture",
+            f"the centre of mass would be at {height:g} m, not above the ground", field="posture"
         )
 
 
-def _wrong(problem: str, source: str) -> ConfigError:
-    return ConfigError(problem, source=source, field="source")
+def _wrong(problem: str) -> ConfigError:
+    return ConfigError(problem, field="source")

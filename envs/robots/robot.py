@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from poise.configs.errors import ConfigError, PoiseWarning
+from poise.configs.errors import ConfigError, PoiseWarning, below, naming
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
 from poise.envs.compiled.copies import Copyable
@@ -197,43 +197,16 @@ def _posture_text(description: RobotDescription) -> str:
 
 
 def _load(path: Path, terrain: Terrain, description: RobotDescription | None = None) -> Robot:
-    source = str(path)
-    description = description or read_description(path)
-    file = model_file(description.source, path)
-    spec, keyframes, ground_name, notes = _prepare(description, path, file, terrain)
-    model = _compile(spec, source)
-    data = mujoco.MjData(model)
+    with naming(path):
+        description = description or read_description(path)
+        file = model_file(description.source, path)
+        spec, keyframes, ground_name, notes = _prepare(description, path, file, terrain)
+        model = _compile(spec)
+        ground = model.geom(ground_name).id
+        data, soles = _stand(model, description, keyframes, ground, file)
+        if terrain.flat:
+            check_scenery(model, data, ground)
     root = model.body(description.root).id
-    bodies = [model.body(foot.body).id for foot in description.feet]
-
-    with pointing_to_scenes(file, "key"):
-        data.qpos[:] = described_qpos(model, description, keyframes, source)
-    mujoco.mj_kinematics(model, data)
-    ground = model.geom(ground_name).id
-    check_ground(model, ground, source)
-    geoms, planes = [], []
-    for i, foot in enumerate(description.feet):
-        with pointing_to_scenes(file, "pair"):
-            ids = sole_geoms(model, bodies[i], foot.geoms, ground, source, f"feet[{i}]")
-        planes.append(find_sole_plane(model, data, bodies[i], ids, source, f"feet[{i}]"))
-        geoms.append(ids)
-    level_soles(model, data, bodies, planes, source)
-    if description.posture.com == "middle":
-        centre_com(model, data, root, bodies, planes, source)
-    turn_forward(model, data, root, description.forward, source)
-    soles = tuple(
-        build_sole(foot.name, foot.body, bodies[i], geoms[i], planes[i], data.xmat[bodies[i]])
-        for i, foot in enumerate(description.feet)
-    )
-    points = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position for s in soles]
-    data.qpos[:3] -= np.mean(points, axis=0)
-    data.qpos[2] -= TOUCH
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-
-    check_standing(data, root, source)
-    if terrain.flat:
-        check_scenery(model, data, ground, source)
     limited = model.jnt_limited[1:, None].astype(bool)
     standing_qpos = data.qpos.copy()
     robot = Robot(
@@ -257,7 +230,7 @@ def _load(path: Path, terrain: Terrain, description: RobotDescription | None = N
         },
         fingerprint=fingerprint(model, standing_qpos),
         keyframes=keyframes,
-        source=source,
+        source=str(path),
         terrain=terrain,
         edge_adr={
             foot.name: int(model.sensor(EDGE_SENSOR + foot.name).adr[0])
@@ -275,6 +248,43 @@ def _load(path: Path, terrain: Terrain, description: RobotDescription | None = N
     ):
         array.setflags(write=False)
     return robot
+
+
+def _stand(
+    model: mujoco.MjModel,
+    description: RobotDescription,
+    keyframes: dict[str, np.ndarray],
+    ground: int,
+    file: Path | None,
+) -> tuple[mujoco.MjData, tuple[Sole, ...]]:
+    """The standing posture, and the soles in it; `file` is the model's, for what errors advise."""
+    data, root = mujoco.MjData(model), model.body(description.root).id
+    bodies = [model.body(foot.body).id for foot in description.feet]
+    with pointing_to_scenes(file, "key"):
+        data.qpos[:] = described_qpos(model, description, keyframes)
+    mujoco.mj_kinematics(model, data)
+    check_ground(model, ground)
+    geoms, planes = [], []
+    for i, foot in enumerate(description.feet):
+        with below(f"feet[{i}]"):
+            with pointing_to_scenes(file, "pair"):
+                geoms.append(sole_geoms(model, bodies[i], foot.geoms, ground))
+            planes.append(find_sole_plane(model, data, bodies[i], geoms[i]))
+    level_soles(model, data, bodies, planes)
+    if description.posture.com == "middle":
+        centre_com(model, data, root, bodies, planes)
+    turn_forward(model, data, root, description.forward)
+    soles = tuple(
+        build_sole(foot.name, foot.body, bodies[i], geoms[i], planes[i], data.xmat[bodies[i]])
+        for i, foot in enumerate(description.feet)
+    )
+    points = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position for s in soles]
+    data.qpos[:3] -= np.mean(points, axis=0)
+    data.qpos[2] -= TOUCH
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    check_standing(data, root)
+    return data, soles
 
 
 def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
@@ -298,22 +308,21 @@ def _prepare(
 ) -> tuple[mujoco.MjSpec, dict[str, np.ndarray], str, list[str]]:
     """The model with motors, ground, sensors and options; its keyframes; the ground's name; what
     was changed."""
-    source = str(path)
     bound_cache()
     spec = _read(description, path, file)
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
     add_paired_ground(spec, description.ground)
-    model = _compile(spec, source)
-    check_numbers(model, DYNAMICS + CONTACTS, source)
-    check_bodies(model, description, source)
-    ground, notes = install_ground(spec, model, description.ground, source)
+    model = _compile(spec)
+    check_numbers(model, DYNAMICS + CONTACTS)
+    check_bodies(model, description)
+    ground, notes = install_ground(spec, model, description.ground)
     install_daylight(spec)
     keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
     for element in [*spec.keys, *spec.sensors]:  # they need not fit the new actuators
         spec.delete(element)
-    install_motors(spec, model, description.torque_limits, source)
-    set_passive(spec, description, source)
+    install_motors(spec, model, description.torque_limits)
+    set_passive(spec, description)
     notes += switch_on(spec)
     if terrain.flat:
         add_contact_sensors(spec, description, ground)
@@ -323,25 +332,23 @@ def _prepare(
         add_terrain_sensors(spec, CONTACT_SENSOR, feet)
     set_options(spec, description.options)
     for note in notes:
-        warnings.warn(f"{source}: {note}", PoiseWarning, stacklevel=4)
+        warnings.warn(f"{path}: {note}", PoiseWarning, stacklevel=4)
     return spec, keyframes, ground, notes
 
 
 def _read(description: RobotDescription, path: Path, file: Path | None) -> mujoco.MjSpec:
     """The model as it comes from its file, or from its builder."""
-    origin, source = description.source, str(path)
+    origin = description.source
     if file is None:
         return BUILDERS[str(origin.builder)]()
     if origin.urdf is not None:
         srdf = None if origin.srdf is None else ros_file(origin.srdf, path, "source.srdf")
-        return read_urdf(file, source, srdf)
-    return read_mjcf(file, tuple(foot.body for foot in description.feet), source)
+        return read_urdf(file, srdf)
+    return read_mjcf(file, tuple(foot.body for foot in description.feet))
 
 
-def _compile(spec: mujoco.MjSpec, source: str) -> mujoco.MjModel:
+def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
     try:
         return spec.compile()
     except Exception as error:  # whatever MuJoCo has
-        raise ConfigError(
-            f"the model does not compile: {error}", source=source, field="source"
-        ) from None
+        raise ConfigError(f"the model does not compile: {error}", field="source") from None

@@ -64,8 +64,6 @@ def sole_geoms(
     body_id: int,
     names: tuple[str, ...],
     ground: int,
-    source: str,
-    field: str,
 ) -> tuple[int, ...]:
     """The geoms of a sole: those named, or all that are fixed to the foot and touch the ground.
 
@@ -85,17 +83,14 @@ def sole_geoms(
         if name not in named:
             raise ConfigError(
                 f"{shown(name)} is no geom of the foot that collides with the ground",
-                source=source,
-                field=f"{field}.geoms",
+                field="geoms",
                 choices=named,
             )
     if not solid:
         raise ConfigError(
             f"the foot {model.body(body_id).name!r} has no collision geometry: none of its "
             f"{len(rigid)} geoms collides with the ground (contype, conaffinity, pairs)"
-            + _fixed_to(model, body_id),
-            source=source,
-            field=field,
+            + _fixed_to(model, body_id)
         )
     return tuple(dict.fromkeys(geom for name in names or solid for geom in named[name]))
 
@@ -111,8 +106,6 @@ def find_sole_plane(
     data: mujoco.MjData,
     body_id: int,
     geom_ids: tuple[int, ...],
-    source: str,
-    field: str,
 ) -> SolePlane:
     """The plane on which the foot would rest, near the horizontal in the present posture.
 
@@ -133,9 +126,7 @@ def find_sole_plane(
     if side is None or len(points) < 3 or spread[1] < MIN_SPAN / 2:
         raise ConfigError(
             f"the foot {model.body(body_id).name!r} has no flat side of collision geometry within "
-            f"{np.rad2deg(MAX_TILT):.0f}° of the ground in the standing posture",
-            source=source,
-            field=field,
+            f"{np.rad2deg(MAX_TILT):.0f}° of the ground in the standing posture"
         )
     return SolePlane(normal=-down, points=points)
 

@@ -24,7 +24,6 @@ def described_qpos(
     model: mujoco.MjModel,
     description: RobotDescription,
     keyframes: dict[str, np.ndarray],
-    source: str,
 ) -> np.ndarray:
     """(nq,) the posture as described, not yet levelled.
 
@@ -34,7 +33,6 @@ def described_qpos(
         model: the robot.
         description: its ``posture`` is used.
         keyframes: keyframe name → qpos, of the source model.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: an unknown keyframe or joint, or an angle out of the joint's range.
@@ -45,14 +43,13 @@ def described_qpos(
         if posture.keyframe not in keyframes:
             raise ConfigError(
                 f"no keyframe is called {shown(posture.keyframe)}",
-                source=source,
                 field="posture.keyframe",
                 choices=keyframes,
             )
         qpos = keyframes[posture.keyframe].copy()
     simple = [i for i in range(model.njnt) if model.jnt_type[i] in SIMPLE_JOINTS]
     names = [model.joint(i).name for i in simple]
-    given = match_names(posture.joints, names, source, "posture.joints")
+    given = match_names(posture.joints, names, None, "posture.joints")
     for i, name in zip(simple, names, strict=True):
         low, high = model.jnt_range[i] if model.jnt_limited[i] else (-np.inf, np.inf)
         value = qpos[model.jnt_qposadr[i]]
@@ -64,7 +61,6 @@ def described_qpos(
                 raise ConfigError(
                     f"{given[name]:g} is outside the range of the joint {name!r}, "
                     f"{low * unit:g} to {high * unit:g}",
-                    source=source,
                     field="posture.joints",
                 )
         qpos[model.jnt_qposadr[i]] = np.clip(value, low, high)
@@ -76,7 +72,6 @@ def level_soles(
     data: mujoco.MjData,
     feet: Sequence[int],
     planes: Sequence[SolePlane],
-    source: str,
 ) -> None:
     """Turn the leg joints of ``data.qpos`` a little so that both soles are level and equally high.
 
@@ -88,7 +83,6 @@ def level_soles(
         data: its ``qpos`` is changed; the kinematics are up to date afterwards.
         feet: foot body ids.
         planes: where each foot rests.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: the legs cannot do it within 3° per joint.
@@ -113,7 +107,6 @@ def level_soles(
             "the soles cannot be made flat and equally high by turning leg joints by "
             f"{np.degrees(MAX_CORRECTION):.0f}° at most: as described, they are tilted, {names}, "
             f"and one is {1000.0 * abs(first[4]):.1f} mm higher; correct the standing posture",
-            source=source,
             field="posture",
         )
 
@@ -124,7 +117,6 @@ def centre_com(
     root: int,
     feet: Sequence[int],
     planes: Sequence[SolePlane],
-    source: str,
 ) -> None:
     """Turn the leg joints of ``data.qpos`` so that the CoM is over the middle of the level soles.
 
@@ -138,7 +130,6 @@ def centre_com(
         root: id of the root body.
         feet: foot body ids.
         planes: where each foot rests.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: the legs do not bring it there.
@@ -172,7 +163,6 @@ def centre_com(
             f"{1000.0 * np.hypot(*stance[:2]):.0f} mm away, and would be {1000.0 * left:.0f} mm "
             f"away with a joint turned by {np.degrees(turned):.0f}° (at most "
             f"{np.degrees(MAX_SHIFT):.0f}°): give a posture nearer to it",
-            source=source,
             field="posture.com",
         )
 
@@ -243,7 +233,6 @@ def turn_forward(
     data: mujoco.MjData,
     root: int,
     forward: tuple[float, float, float],
-    source: str,
 ) -> None:
     """Turn the robot about the vertical until its forward axis points along +x.
 
@@ -252,7 +241,6 @@ def turn_forward(
         data: its ``qpos`` is changed; the kinematics are up to date afterwards.
         root: id of the root body.
         forward: forward direction in the root body's frame.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: the forward axis is steeper than 60° in the standing posture.
@@ -261,7 +249,6 @@ def turn_forward(
     if np.hypot(axis[0], axis[1]) < 0.5 * np.linalg.norm(axis):
         raise ConfigError(
             "this axis of the root body is not level in the standing posture",
-            source=source,
             field="forward",
         )
     half = -0.5 * np.arctan2(axis[1], axis[0])

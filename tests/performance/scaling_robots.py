@@ -104,8 +104,8 @@ def _with_all_soles(robot: Robot, names: list[str]) -> Robot:
     soles = []
     for name in names:
         body = model.body(f"{name}_foot").id
-        geoms = sole_geoms(model, body, (), robot.ground_geom_id, "scaling", name)
-        plane = find_sole_plane(model, data, body, geoms, "scaling", name)
+        geoms = sole_geoms(model, body, (), robot.ground_geom_id)
+        plane = find_sole_plane(model, data, body, geoms)
         soles.append(build_sole(name, f"{name}_foot", body, geoms, plane, data.xmat[body]))
     # the counters of contacts are not read here: any address will do
     sensors = robot.sensor_adr | dict.fromkeys(names, robot.sensor_adr["left"])

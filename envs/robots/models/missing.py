@@ -16,7 +16,7 @@ TETRAHEDRON = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 _UNOPENED = re.compile(r"Error opening file '(.*)'")
 
 
-def drop_missing(spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...], source: str) -> None:
+def drop_missing(spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...]) -> None:
     """Take what has a missing file out of a model, with one warning that names it.
 
     MuJoCo itself decides what is missing: it alone knows the folders of included and attached
@@ -26,7 +26,6 @@ def drop_missing(spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...], source:
         spec: the model, changed in place.
         path: its file, for the warning.
         feet: names of the foot bodies.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: a foot collides with a missing mesh, or a body has its mass from it.
@@ -39,9 +38,9 @@ def drop_missing(spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...], source:
                if (type(each), i) in lost}
         for kind, assets in _assets(spec).items()
     }  # fmt: skip
-    bodies = _drop_meshes(spec, missing["mesh"], feet, source)
+    bodies = _drop_meshes(spec, missing["mesh"], feet)
     _drop_textures(spec, set(missing["texture"]))
-    _drop_height_fields(spec, set(missing["hfield"]), source)
+    _drop_height_fields(spec, set(missing["hfield"]))
     for skin in [skin for skin in spec.skins if skin.name in missing["skin"]]:
         spec.delete(skin)
     files = list(dict.fromkeys(lost.values()))
@@ -108,9 +107,7 @@ def _make_up(spec: mujoco.MjSpec, asset: Asset) -> None:
         spec.delete(asset)
 
 
-def _drop_meshes(
-    spec: mujoco.MjSpec, missing: dict[str, str], feet: tuple[str, ...], source: str
-) -> list[str]:
+def _drop_meshes(spec: mujoco.MjSpec, missing: dict[str, str], feet: tuple[str, ...]) -> list[str]:
     """The bodies that lose a shape which would have collided."""
     bodies = []
     for geom in [geom for geom in spec.geoms if geom.meshname in missing]:
@@ -129,9 +126,7 @@ def _drop_meshes(
             spec.delete(geom)
             continue
         raise ConfigError(
-            f"the file {missing[geom.meshname]} of mesh {geom.meshname!r} is missing, and {reason}",
-            source=source,
-            field="source.mjcf",
+            f"the file {missing[geom.meshname]} of mesh {geom.meshname!r} is missing, and {reason}"
         )
     for mesh in [mesh for mesh in spec.meshes if mesh.name in missing]:
         spec.delete(mesh)
@@ -150,9 +145,10 @@ def _drop_textures(spec: mujoco.MjSpec, missing: set[str]) -> None:
         spec.delete(texture)
 
 
-def _drop_height_fields(spec: mujoco.MjSpec, missing: set[str], source: str) -> None:
+def _drop_height_fields(spec: mujoco.MjSpec, missing: set[str]) -> None:
     for field in [field for field in spec.hfields if field.name in missing]:
         if any(geom.hfieldname == field.name for geom in spec.geoms):
-            raise ConfigError(f"the file of the height field {field.name!r} is missing, and a geom "
-                              "is made of it", source=source, field="source.mjcf")  # fmt: skip
+            raise ConfigError(
+                f"the file of the height field {field.name!r} is missing, and a geom is made of it"
+            )
         spec.delete(field)

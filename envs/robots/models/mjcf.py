@@ -7,7 +7,7 @@ from pathlib import Path
 
 import mujoco
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, naming
 from poise.configs.reading import is_file, read_text
 
 from .missing import drop_missing
@@ -16,7 +16,7 @@ from .mjcf_bounds import MJCF_BYTES, MjcfText, check_spec, tags
 SCENE_ELEMENTS = {"pair": "contact pairs", "key": "keyframes"}  # that a scene file often holds
 
 
-def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
+def read_mjcf(path: Path, feet: tuple[str, ...]) -> mujoco.MjSpec:
     """The model in an MJCF file, as MuJoCo reads it by its absolute path.
 
     What needs a missing file is dropped with a warning, see `drop_missing`. That is refused for a
@@ -25,24 +25,22 @@ def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
     Args:
         path: the MJCF file.
         feet: names of the foot bodies.
-        source: the description file, for errors.
 
     Raises:
         ConfigError: the file is missing or does not parse, is larger than a robot's model is, or
             a missing mesh matters.
     """
-    if not is_file(path):
-        raise ConfigError(f"no such file: {path}", source=source, field="source.mjcf")
-    path = Path(os.path.abspath(path))  # by a relative one MuJoCo misses what an include names;
-    text = MjcfText(path, source)  # and links stay, beside which a package keeps the meshes
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except Exception as error:  # of the XML, of MuJoCo, of the text in it
-        raise ConfigError(
-            f"{path} is not valid MJCF: {error}", source=source, field="source.mjcf"
-        ) from None
-    check_spec(spec, text.folders, source)
-    drop_missing(spec, path, feet, source)
+    with naming(field="source.mjcf"):
+        if not is_file(path):
+            raise ConfigError(f"no such file: {path}")
+        path = Path(os.path.abspath(path))  # by a relative one MuJoCo misses what an include names;
+        text = MjcfText(path)  # and links stay, beside which a package keeps the meshes
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+        except Exception as error:  # of the XML, of MuJoCo, of the text in it
+            raise ConfigError(f"{path} is not valid MJCF: {error}") from None
+        check_spec(spec, text.folders)
+        drop_missing(spec, path, feet)
     return spec
 
 

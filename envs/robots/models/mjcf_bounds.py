@@ -45,12 +45,10 @@ class MjcfText:
 
     Args:
         path: the main file.
-        source: the description file, for errors.
-        field: the field in it that names `path`.
     """
 
-    def __init__(self, path: Path, source: str, field: str = "source.mjcf"):
-        self._main, self._source, self._field = path.parent, source, field
+    def __init__(self, path: Path):
+        self._main = path.parent
         self.folders: set[Path] = set()
         self._elements = self._attached = self._models = self._size = 0
         self._folders = {path.parent, path.parent.resolve()}
@@ -58,16 +56,16 @@ class MjcfText:
         self._walk(path, 1, 0)
         self._check_regular()
         if self._elements + self._attached * self._models > ELEMENTS:
-            raise self._wrong(f"the model has more than {ELEMENTS} elements, with their copies")
+            raise ConfigError(f"the model has more than {ELEMENTS} elements, with their copies")
 
     def _walk(self, path: Path, factor: int, depth: int) -> None:
         """Count a file whose elements are copied `factor` times."""
         if depth > NESTED:
-            raise self._wrong(f"more than {NESTED} files include each other")
+            raise ConfigError(f"more than {NESTED} files include each other")
         text = read_text(path, MJCF_BYTES)  # MuJoCo itself takes names that are no text
         self._size += len(text)
         if self._size > MJCF_BYTES:
-            raise self._wrong(f"its files are together larger than {MJCF_BYTES / MIB:g} MiB")
+            raise ConfigError(f"its files are together larger than {MJCF_BYTES / MIB:g} MiB")
         self._folders.add(path.parent)
         factors = [factor]
         self.folders.add(path.parent)
@@ -85,14 +83,14 @@ class MjcfText:
     ) -> None:
         factor, count = factors[-1], _whole(attributes.get("count", "1"))
         if count > COPIES.get(name, ELEMENTS):
-            raise self._wrong(f"{name} would make more than {COPIES.get(name, ELEMENTS)} copies")
+            raise ConfigError(f"{name} would make more than {COPIES.get(name, ELEMENTS)} copies")
         self._elements += factor * (count if name in ("composite", "flexcomp") else 1)
         if self._elements > ELEMENTS:
-            raise self._wrong(f"the model has more than {ELEMENTS} elements, with their copies")
+            raise ConfigError(f"the model has more than {ELEMENTS} elements, with their copies")
         if name == "mesh" and any(abs(x) > BUILTIN for x in _numbers(attributes.get("params", ""))):
-            raise self._wrong(f"params of a mesh must be at most {BUILTIN:g}")
+            raise ConfigError(f"params of a mesh must be at most {BUILTIN:g}")
         if name == "hfield" and _sides(attributes) > PIXELS:  # MuJoCo reserves it as it reads
-            raise self._wrong(f"a height field may have at most {PIXELS} points")
+            raise ConfigError(f"a height field may have at most {PIXELS} points")
         if name == "attach":
             self._attached += factor
         if name == "compiler":
@@ -115,13 +113,10 @@ class MjcfText:
         """Raise ConfigError where a name may be that of what is no regular file."""
         names = self._names | {name.replace("\\", "/").rpartition("/")[2] for name in self._names}
         if len(self._folders) * len(self._within) * len(names) > NAMED:
-            raise self._wrong("it names too many files in too many folders")
+            raise ConfigError("it names too many files in too many folders")
         for parts in product(self._folders, self._within, names):
             if exists(path := Path(*parts)) and not (is_file(path) or is_folder(path)):
-                raise self._wrong(f"{path} is not a regular file")
-
-    def _wrong(self, problem: str) -> ConfigError:
-        return _wrong(problem, self._source, self._field)
+                raise ConfigError(f"{path} is not a regular file")
 
 
 def bound_cache() -> None:
@@ -131,35 +126,31 @@ def bound_cache() -> None:
         mujoco.mj_setCacheCapacity(cache, KEPT)
 
 
-def check_spec(
-    spec: mujoco.MjSpec, folders: set[Path], source: str, field: str = "source.mjcf"
-) -> None:
+def check_spec(spec: mujoco.MjSpec, folders: set[Path]) -> None:
     """Raise ConfigError for a model that is larger than a robot is, before it is compiled.
 
     The `folders` are those in which its meshes and textures may lie.
     """
     for name, most in LISTS.items():
         if len(getattr(spec, name)) > most:
-            raise _wrong(f"the model has more than {most} {name}", source, field)
+            raise ConfigError(f"the model has more than {most} {name}")
     for name in _RESERVED:
         if getattr(spec, name) > LONGEST:
-            raise _wrong(f"size: {name} must be at most {LONGEST}", source, field)
+            raise ConfigError(f"size: {name} must be at most {LONGEST}")
     if max(spec.memory, spec.nstack * 8, spec.njmax * 1000, spec.nconmax * 1000) > MEMORY:
-        raise _wrong(f"size: memory must be at most {MEMORY / MIB:g} MiB", source, field)
+        raise ConfigError(f"size: memory must be at most {MEMORY / MIB:g} MiB")
     reserved = [x for s in spec.sensors for x in (s.dim, s.nsample)]
     reserved += [x for a in spec.actuators for x in (a.actdim, a.nsample)]
     if max(reserved, default=0) > LONGEST:
-        raise _wrong(
-            f"sensors and actuators may have at most {LONGEST} numbers each", source, field
-        )
+        raise ConfigError(f"sensors and actuators may have at most {LONGEST} numbers each")
     if any(math.prod(map(int, camera.resolution)) > PIXELS for camera in spec.cameras):
-        raise _wrong(f"a camera may have at most {PIXELS} pixels", source, field)
+        raise ConfigError(f"a camera may have at most {PIXELS} pixels")
     if spec.visual.global_.offwidth * spec.visual.global_.offheight > PIXELS:
-        raise _wrong(f"visual: a picture may have at most {PIXELS} pixels", source, field)
-    _check_assets(spec, folders, source, field)
+        raise ConfigError(f"visual: a picture may have at most {PIXELS} pixels")
+    _check_assets(spec, folders)
 
 
-def _check_assets(spec: mujoco.MjSpec, folders: set[Path], source: str, field: str) -> None:
+def _check_assets(spec: mujoco.MjSpec, folders: set[Path]) -> None:
     """Sizes of textures, height fields and the files of these and of meshes."""
     sides = [t.width * (t.height or t.width) * (1 if t.height else 6) for t in spec.textures]
     sides += [h.nrow * h.ncol for h in spec.hfields]
@@ -171,13 +162,15 @@ def _check_assets(spec: mujoco.MjSpec, folders: set[Path], source: str, field: s
         with file.open("rb") as opened:
             head = opened.read(len(POINTER))
         if file.stat().st_size > ASSET_BYTES:
-            raise _wrong(f"{file} is larger than {ASSET_BYTES / MIB:g} MiB", source, field)
+            raise ConfigError(f"{file} is larger than {ASSET_BYTES / MIB:g} MiB")
         if head.startswith(POINTER):
-            raise _wrong(f"{file} is the pointer that Git LFS leaves where a file is to be fetched "
-                         "still: git lfs pull", source, field)  # fmt: skip
+            raise ConfigError(
+                f"{file} is the pointer that Git LFS leaves where a file is to be fetched still: "
+                "git lfs pull"
+            )
         sides.append(_pixels(head))
     if sum(sides) > PIXELS:
-        raise _wrong(f"textures and height fields may have at most {PIXELS} pixels", source, field)
+        raise ConfigError(f"textures and height fields may have at most {PIXELS} pixels")
 
 
 def _pixels(head: bytes) -> int:
@@ -219,7 +212,3 @@ def _sides(attributes: dict[str, str]) -> int:
 def _whole(text: str) -> int:
     """The product of the numbers in an attribute, none of them less than 1."""
     return int(min(math.prod(max(1.0, x) for x in _numbers(text)), 1e12))
-
-
-def _wrong(problem: str, source: str, field: str) -> ConfigError:
-    return ConfigError(problem, source=source, field=field)

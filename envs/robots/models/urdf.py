@@ -9,12 +9,11 @@ from pathlib import Path
 
 import mujoco
 
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, naming, shown
 from poise.configs.reading import is_file, is_folder, read_text
 
 from .mjcf_bounds import MJCF_BYTES, MjcfText, check_spec
 
-FIELD = "source.urdf"
 PACKAGE = "package://"
 PACKAGES = "ROS_PACKAGE_PATH"  # of the environment: folders of packages, separated by colons
 MESHES = (".stl", ".obj", ".msh")  # that MuJoCo reads
@@ -25,7 +24,7 @@ WHEELS = (
 FREE, EQUAL_JOINTS = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtEq.mjEQ_JOINT
 
 
-def read_urdf(path: Path, source: str, srdf: Path | None = None) -> mujoco.MjSpec:
+def read_urdf(path: Path, srdf: Path | None = None) -> mujoco.MjSpec:
     """The model in a URDF file, with a free joint where its root is fixed to the world.
 
     Links keep their names and frames, those at fixed joints too. A link's mass is what the file
@@ -35,7 +34,6 @@ def read_urdf(path: Path, source: str, srdf: Path | None = None) -> mujoco.MjSpe
 
     Args:
         path: the URDF file.
-        source: the description file, for errors.
         srdf: an SRDF file; the pairs of links in its ``disable_collisions`` do not collide. Links
             that the URDF file lacks do not count.
 
@@ -44,25 +42,27 @@ def read_urdf(path: Path, source: str, srdf: Path | None = None) -> mujoco.MjSpe
             mesh that collides is missing; a joint mimics another; a floating joint is not the
             root's.
     """
-    robot = _parse(path, source, FIELD)
-    _set_compiler(robot)
-    files = _rename_meshes(robot)
-    names = Counter(name for joint in robot.findall("joint") if (name := joint.get("name")))
-    if names and (most := names.most_common(1)[0])[1] > 1:  # MuJoCo says so much later
-        raise _wrong(f"{path} is not valid URDF: two joints are called {shown(most[0])}", source)
-    try:
-        spec = mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding="unicode"))
-    except Exception as error:  # of MuJoCo, of the text in the file
-        raise _wrong(f"{path} is not valid URDF: {error}", source) from None
-    _take_meshes(spec, files, path, source)
-    check_spec(spec, {path.parent}, source, FIELD)
-    for geom in spec.geoms:
-        geom.mass = geom.density = 0.0
-        geom.group = HIDDEN if geom.contype or geom.conaffinity else geom.group
-    _check_joints(spec, source)
-    _let_root_float(spec)
+    with naming(field="source.urdf"):
+        robot = _parse(path, "URDF")
+        _set_compiler(robot)
+        files = _rename_meshes(robot)
+        names = Counter(name for joint in robot.findall("joint") if (name := joint.get("name")))
+        if names and (most := names.most_common(1)[0])[1] > 1:  # MuJoCo says so much later
+            raise ConfigError(f"{path} is not valid URDF: two joints are called {shown(most[0])}")
+        try:
+            spec = mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding="unicode"))
+        except Exception as error:  # of MuJoCo, of the text in the file
+            raise ConfigError(f"{path} is not valid URDF: {error}") from None
+        _take_meshes(spec, files, path)
+        check_spec(spec, {path.parent})
+        for geom in spec.geoms:
+            geom.mass = geom.density = 0.0
+            geom.group = HIDDEN if geom.contype or geom.conaffinity else geom.group
+        _check_joints(spec)
+        _let_root_float(spec)
     if srdf is not None:
-        _exclude_pairs(spec, _parse(srdf, source, "source.srdf"))
+        with naming(field="source.srdf"):
+            _exclude_pairs(spec, _parse(srdf, "SRDF"))
     return spec
 
 
@@ -92,21 +92,20 @@ def _package_folders(package: str, near: Path) -> Iterator[Path]:
     yield Path(sysconfig.get_path("purelib")) / WHEELS / package
 
 
-def _parse(path: Path, source: str, field: str) -> ElementTree.Element:
+def _parse(path: Path, kind: str) -> ElementTree.Element:
     """The root element of a URDF or SRDF file, read within bounds."""
     if not is_file(path):
-        raise _wrong(f"no such file: {path}", source, field)
-    MjcfText(path, source, field)
+        raise ConfigError(f"no such file: {path}")
+    MjcfText(path)
     text = read_text(path, MJCF_BYTES)
-    kind = field.rpartition(".")[2].upper()
     if "<!DOCTYPE" in text:
-        raise _wrong(f"{path} has a document type, which no {kind} needs", source, field)
+        raise ConfigError(f"{path} has a document type, which no {kind} needs")
     try:
         robot = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise _wrong(f"{path} is not valid {kind}: {error}", source, field) from None
+        raise ConfigError(f"{path} is not valid {kind}: {error}") from None
     if robot.tag != "robot":
-        raise _wrong(f"{path} is not valid {kind}: it begins with <{robot.tag}>", source, field)
+        raise ConfigError(f"{path} is not valid {kind}: it begins with <{robot.tag}>")
     return robot
 
 
@@ -142,7 +141,7 @@ def _rename_meshes(robot: ElementTree.Element) -> dict[str, str]:
     return {new: file for (file, _), new in names.items()}
 
 
-def _take_meshes(spec: mujoco.MjSpec, files: dict[str, str], path: Path, source: str) -> None:
+def _take_meshes(spec: mujoco.MjSpec, files: dict[str, str], path: Path) -> None:
     """Give the meshes their files. Where one cannot be had, what is only seen of it goes."""
     lost = set()
     for mesh in spec.meshes:
@@ -153,13 +152,13 @@ def _take_meshes(spec: mujoco.MjSpec, files: dict[str, str], path: Path, source:
             mesh.file = str(file.resolve())
     for geom in [geom for geom in spec.geoms if geom.meshname in lost]:
         if geom.contype or geom.conaffinity:
-            raise _unread(files[geom.meshname], geom.parent.name, path, source)
+            raise _unread(files[geom.meshname], geom.parent.name, path)
         spec.delete(geom)
     for mesh in [mesh for mesh in spec.meshes if mesh.name in lost]:
         spec.delete(mesh)
 
 
-def _unread(name: str, link: str, path: Path, source: str) -> ConfigError:
+def _unread(name: str, link: str, path: Path) -> ConfigError:
     """A mesh with which a link collides, and that there is not, or not in a form for MuJoCo."""
     if find_file(name, path) is not None:
         reason = f"is not of a form that MuJoCo reads ({', '.join(MESHES)}): convert it to one"
@@ -167,22 +166,21 @@ def _unread(name: str, link: str, path: Path, source: str) -> ConfigError:
         reason = f"is missing: its package is looked for above {path.parent} and in {PACKAGES}"
     else:
         reason = "is missing"
-    return _wrong(f"the mesh {shown(name)} of the link {link!r} {reason}", source)
+    return ConfigError(f"the mesh {shown(name)} of the link {link!r} {reason}")
 
 
-def _check_joints(spec: mujoco.MjSpec, source: str) -> None:
+def _check_joints(spec: mujoco.MjSpec) -> None:
     """Refuse joints that mimic others, and floating ones that hold more than a root."""
     for equal in spec.equalities:
         if equal.type == EQUAL_JOINTS:
-            raise _wrong(
+            raise ConfigError(
                 f"the joint {equal.name1!r} mimics {equal.name2!r}, which is not supported: "
-                "make it fixed",
-                source,
+                "make it fixed"
             )
     for joint in spec.joints:
         if joint.type == FREE and joint.parent.parent.name != "world":
-            raise _wrong(
-                f"the floating joint {joint.name!r} does not join its link to the world", source
+            raise ConfigError(
+                f"the floating joint {joint.name!r} does not join its link to the world"
             )
 
 
@@ -191,7 +189,3 @@ def _let_root_float(spec: mujoco.MjSpec) -> None:
     tops = [body for body in spec.bodies if body.parent is not None and body.parent.name == "world"]
     if len(tops) == 1 and not tops[0].joints:
         tops[0].add_freejoint()
-
-
-def _wrong(problem: str, source: str, field: str = FIELD) -> ConfigError:
-    return ConfigError(problem, source=source, field=field)

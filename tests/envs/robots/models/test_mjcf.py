@@ -191,7 +191,7 @@ def test_meshes_of_an_attached_file_lie_beside_it(tmp_path: Path) -> None:
     """Its `meshdir` is its own; what MuJoCo finds is played."""
     scene = attached(tmp_path, "r", foot=SOLID + BOX_FOOT, trunk='<geom type="mesh" mesh="hull"/>')
     put_mesh(tmp_path / "r/meshes")
-    read = read_mjcf(scene, ("r_left_foot",), "robot.yaml").compile()
+    read = read_mjcf(scene, ("r_left_foot",)).compile()
     assert geoms(read) == geoms(mujoco.MjModel.from_xml_path(str(scene)))
 
 
@@ -200,7 +200,7 @@ def test_only_the_file_that_is_missing_is(tmp_path: Path) -> None:
     scene = attached(tmp_path, "pq", trunk='<geom type="mesh" mesh="hull" mass="0"/>')
     put_mesh(tmp_path / "q/meshes")
     with pytest.warns(PoiseWarning, match=r"geometry: p_trunk$"):
-        model = read_mjcf(scene, (), "robot.yaml").compile()
+        model = read_mjcf(scene, ()).compile()
     assert [model.mesh(i).name for i in range(model.nmesh)] == ["q_hull"]
 
 
@@ -252,7 +252,7 @@ def test_what_is_played_is_what_mujoco_reads(path: Path) -> None:
         theirs = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         pytest.skip(f"a part of a model, or one whose meshes its package lacks: {error}")
-    ours = read_mjcf(path, (), "robot.yaml").compile()
+    ours = read_mjcf(path, ()).compile()
     assert geoms(ours) == geoms(theirs)
     for name in DYNAMICS:
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))

@@ -107,7 +107,7 @@ def test_a_bomb_is_refused_at_once(tmp_path: Path, what: str) -> None:
     path = tmp_path / "bomb.xml"
     path.write_text(f"<mujoco>{content}</mujoco>")
     with no_hang(), pytest.raises(ConfigError) as caught:
-        read_mjcf(path, (), "robot.yaml")
+        read_mjcf(path, ())
     text = str(caught.value)
     assert text.isprintable() and any(word in text for word in problem.split("|")), text
 
@@ -119,7 +119,7 @@ def test_copies_within_the_bounds_are_made(tmp_path: Path) -> None:
     field = '<asset><hfield name="h" nrow="9" ncol="9" size="1 1 1 1"/></asset>'
     copies = world(f'<replicate count="40">{BODY}</replicate>')
     path.write_text(f'<mujoco><include file="part.xml"/>{field}{copies}</mujoco>')
-    model: mujoco.MjModel = read_mjcf(path, (), "robot.yaml").compile()
+    model: mujoco.MjModel = read_mjcf(path, ()).compile()
     assert model.nbody == 42 and model.nhfield == 1
 
 

@@ -41,7 +41,7 @@ class PostureFigures:
 
 def posture_figures(robot: Robot) -> PostureFigures:
     """Joint angles alone are compared; where the root is does not count."""
-    described = described_qpos(robot.model, robot.description, robot.keyframes, robot.name)
+    described = described_qpos(robot.model, robot.description, robot.keyframes)
     postures = {ZERO: robot.model.qpos0, **robot.keyframes}
     com = standing_data(robot).subtree_com[robot.root_body_id]
     return PostureFigures(
