@@ -44,11 +44,10 @@ from .episode import (
     make_judge,
 )
 from .mdp.docstrings import filled
-from .mdp.measured import MeasuredView
 from .mdp.observation import Term, Terms, View, frames, mirror_terms, observer, scales
 from .mdp.reward import REWARD_TERMS
 from .mdp.termination import episode_limits
-from .mdp.terms import TERMS
+from .mdp.terms import TERMS, MeasuredView
 from .servos import holding_torques
 from .start import RESET_OPTIONS, chosen_pushes, chosen_start, reset_options
 

@@ -9,6 +9,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.physics.legs import standing_data
 from poise.envs.physics.motor_bus import ask_servo
 from poise.envs.physics.simulation import World
 from poise.envs.robots.description import match_names
@@ -117,7 +118,7 @@ def make_servos(robot: Robot, config: ServoConfig) -> Servos:
     """
     dofs = np.array(robot.motor_dofs, dtype=np.int64)
     names = [robot.joint_names[dof - 6] for dof in dofs]
-    data = _standing(robot)
+    data = standing_data(robot)
     stiffness = np.maximum(robot.torque_limit / config.deflection, _carrying(robot, data, config))
     _replace(stiffness, config.stiffness, names, "servos.stiffness")
     inertia = _free_inertia(robot, data)
@@ -147,7 +148,7 @@ def holding_torques(robot: Robot) -> np.ndarray:
     τ = g(q) − τ_passive − Σ J_iᵀ f_i: the ground carries the weight at two points, one for each
     foot, at the CoM's place forward and the soles' places to the side.
     """
-    model, data = robot.model, _standing(robot)
+    model, data = robot.model, standing_data(robot)
     com = data.subtree_com[robot.root_body_id]
     soles = [
         data.xpos[sole.body_id] + data.xmat[sole.body_id].reshape(3, 3) @ sole.position
@@ -162,13 +163,6 @@ def holding_torques(robot: Robot) -> np.ndarray:
         torques = torques - jacobian[2] * part * robot.units.force
     limit = robot.torque_limit
     return np.clip(torques[robot.motor_dofs], -limit, limit)
-
-
-def _standing(robot: Robot) -> mujoco.MjData:
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_forward(robot.model, data)
-    return data
 
 
 def _free_inertia(robot: Robot, data: mujoco.MjData) -> np.ndarray:

@@ -17,14 +17,10 @@ class CallbackAddress(int):
     callback: "Callback"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _address, (self.callback,)
+        return getattr, (self.callback, "address")
 
     def __copy__(self) -> "CallbackAddress":
         return self
-
-
-def _address(callback: "Callback") -> CallbackAddress:
-    return callback.address
 
 
 class Callback:

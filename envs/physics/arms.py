@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from itertools import chain
 
-import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError
@@ -13,6 +12,7 @@ from poise.envs.compiled.maths.easing import eased
 from poise.envs.compiled.maths.noise import uniform
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.description import match_names
+from poise.envs.robots.model_check import lineage
 from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews
@@ -43,8 +43,9 @@ def find_arms(robot: Robot) -> tuple[Arm, ...]:
     for role in ROLES:
         said = match_names(roles[role], names, robot.name, f"roles.{role}")
         shoulder = int(model.joint(min(said, key=names.index)).bodyid[0])
-        joints = [j for j in range(1, model.njnt) if _carries(model, shoulder, j)]
-        deep = max(joints, key=lambda joint: _depth(model, int(model.jnt_bodyid[joint])))
+        lines = {j: lineage(model, int(model.jnt_bodyid[j])) for j in range(1, model.njnt)}
+        joints = [joint for joint, line in lines.items() if shoulder in line]
+        deep = max(joints, key=lambda joint: len(lines[joint]))
         arms.append(Arm(tuple(j - 1 for j in joints), int(model.jnt_bodyid[deep])))
     return tuple(arms)
 
@@ -55,17 +56,6 @@ def check_arms(robot: Robot, source: str, field: str) -> None:
         raise ConfigError(f"the robot {robot.name} has no arms: its description has not the roles "
                           f"{' and '.join(ROLES)}", source=source, field=field,
                           choices=robot.description.roles or ("no roles",))  # fmt: skip
-
-
-def _carries(model: mujoco.MjModel, shoulder: int, joint: int) -> bool:
-    body = int(model.jnt_bodyid[joint])
-    while body not in (0, shoulder):
-        body = int(model.body_parentid[body])
-    return body == shoulder
-
-
-def _depth(model: mujoco.MjModel, body: int) -> int:
-    return 0 if body == 0 else 1 + _depth(model, int(model.body_parentid[body]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,8 @@ import numpy as np
 
 from poise.envs.robots.robot import Robot
 
+from .arrays import dof_chain
+
 ALONG = 0.7  # |cos| between an axis and a direction from which the axis is of that direction
 ANKLE = 1.0 / 3.0  # of the height of a leg's first joint: joints below belong to the ankle
 
@@ -47,7 +49,11 @@ def standing_data(robot: Robot) -> mujoco.MjData:
 def find_legs(robot: Robot) -> tuple[Leg, ...]:
     """The leg of each foot, in the order of the soles."""
     data = standing_data(robot)
-    chains = [_chain(robot.model, sole.body_id) for sole in robot.soles]
+    of_dofs = robot.model.dof_jntid
+    chains = [
+        list(dict.fromkeys(of_dofs[dof_chain(robot.model, sole.body_id)].tolist()))
+        for sole in robot.soles
+    ]
     shared = set(chains[0]).intersection(*chains[1:])
     return tuple(
         _leg(robot.model, data, sole.name, [joint for joint in chain if joint not in shared])
@@ -73,16 +79,6 @@ def turn_range(robot: Robot) -> tuple[float, float]:
                 ends += np.sort(np.sign(up) * np.asarray(span))
         low, high = max(low, ends[0]), min(high, ends[1])
     return min(float(low), 0.0), max(float(high), 0.0)
-
-
-def _chain(model: mujoco.MjModel, body: int) -> list[int]:
-    """The joints between the world and a body."""
-    joints: list[int] = []
-    while body != 0:
-        first = model.body_jntadr[body]
-        joints = [*range(first, first + model.body_jntnum[body]), *joints]
-        body = model.body_parentid[body]
-    return joints
 
 
 def _leg(model: mujoco.MjModel, data: mujoco.MjData, foot: str, joints: list[int]) -> Leg:

@@ -6,6 +6,8 @@ import numpy as np
 from poise.configs.errors import ConfigError, shown
 from poise.envs.terrain.building import ALIKE
 
+from .models.missing import paired_geoms
+
 GROUND = "ground"  # name of a plane that has none
 FLOOR = 0.5  # [m] half of the least side of a box that is taken for a floor
 TOUCHED = 1e-6  # [m] between bodies that touch
@@ -64,8 +66,7 @@ def install_ground(
 
 def add_paired_ground(spec: mujoco.MjSpec, name: str | None) -> None:
     """Add the plane of this name where only contact pairs of the model name it."""
-    paired = {each for pair in spec.pairs for each in (pair.geomname1, pair.geomname2)}
-    if name in paired and name not in {geom.name for geom in spec.geoms}:
+    if name in paired_geoms(spec) and name not in {geom.name for geom in spec.geoms}:
         _add_ground(spec, str(name))
 
 
@@ -85,7 +86,7 @@ def _replace(spec: mujoco.MjSpec, floor: mujoco.MjsGeom) -> mujoco.MjsGeom:
 
 def _floors(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[mujoco.MjsGeom]:
     """Planes, level boxes and cylinders that do not move and collide with anything."""
-    paired = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
+    paired = paired_geoms(spec)
     return [
         geom
         for geom in spec.geoms

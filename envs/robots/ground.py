@@ -11,20 +11,6 @@ OVERRIDE = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
 NEEDED = {name: int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")) for name in (
     "constraint", "contact", "gravity", "clampctrl", "actuation", "sensor")}  # fmt: skip
 CONTACT_SENSOR = "contact_"  # prefix of the sensors' names
-INTEGRATORS = {
-    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
-    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
-}
-CONES = {
-    "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL,
-    "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC,
-}
-SOLVERS = {
-    "Newton": mujoco.mjtSolver.mjSOL_NEWTON,
-    "CG": mujoco.mjtSolver.mjSOL_CG,
-    "PGS": mujoco.mjtSolver.mjSOL_PGS,
-}
 
 
 def can_touch(model: mujoco.MjModel, geom: int, other: int) -> bool:
@@ -88,10 +74,10 @@ def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:
     What the description leaves out stays as the model has it.
     """
     spec.option.timestep = options.timestep
-    spec.option.integrator = INTEGRATORS[options.integrator]
-    spec.option.solver = SOLVERS[options.solver]
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{options.integrator.upper()}")
+    spec.option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{options.solver.upper()}")
     if options.cone is not None:
-        spec.option.cone = CONES[options.cone]
+        spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{options.cone.upper()}")
     if options.impratio is not None:
         spec.option.impratio = options.impratio
     if options.friction is not None:

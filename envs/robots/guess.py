@@ -20,10 +20,11 @@ from .description import (
 )
 from .floors import check_ground, install_ground
 from .ground import can_touch
+from .model_check import lineage
 from .models.mjcf import pointing_to_scenes, read_mjcf
 from .models.urdf import read_urdf
 from .soles import find_sole_plane, sole_geoms
-from .standing import centre_com, described_qpos, level_soles
+from .standing import Stance, described_qpos
 
 MODELS = (".xml", ".mjcf", ".urdf")  # suffixes of models that can be named in a description's place
 HIGHER = 0.1  # of the robot's height: by which all other limbs end above the feet
@@ -135,7 +136,7 @@ class _Guess:
         inner = {int(model.body_weldid[model.body_parentid[body]]) for body in heads}
         lowest = sorted((self._lowest(body), body) for body in heads - inner)
         lowest = [(z, body) for z, body in lowest if np.isfinite(z)]
-        height = self._height()
+        height = np.ptp(self.data.xpos[own, 2])
         if len(lowest) < 2 or lowest[1][0] - lowest[0][0] > ALIKE * height:
             raise _unsure("no two limbs that collide with the ground end equally low", "feet")
         if len(lowest) > 2 and lowest[2][0] - lowest[0][0] < HIGHER * height:
@@ -161,21 +162,12 @@ class _Guess:
                 found = min(found, float(z))
         return found
 
-    def _height(self) -> float:
-        places = self.data.xpos[self.model.body_rootid == self.root, 2]
-        return float(np.ptp(places))
-
     def _chains(self) -> list[list[int]]:
         """The joints of each leg, from the root on."""
         model, chains = self.model, []
         for foot in self.feet:
-            joints: list[int] = []
-            body = foot
-            while body not in (self.root, 0):
-                first = int(model.body_jntadr[body])
-                joints = [*range(first, first + int(model.body_jntnum[body])), *joints]
-                body = int(model.body_parentid[body])
-            chains.append(joints)
+            line = lineage(model, foot)
+            chains.append([j for j in range(model.njnt) if model.jnt_bodyid[j] in line])
         shared = set(chains[0]) & set(chains[1])
         return [[joint for joint in chain if joint not in shared] for chain in chains]
 
@@ -264,8 +256,9 @@ class _Guess:
         for foot in self.feet:
             geoms = sole_geoms(model, foot, (), self.ground)
             planes.append(find_sole_plane(model, data, foot, geoms))
-        level_soles(model, data, self.feet, planes)
-        centre_com(model, data, self.root, self.feet, planes)
+        stance = Stance(model, data, self.root, self.feet, planes)
+        stance.level_soles()
+        stance.centre_com()
         mujoco.mj_collision(model, data)
         return any(
             contact.dist < -DEEP and all(model.geom_bodyid[geom] for geom in contact.geom)

@@ -53,11 +53,9 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription) -> None:
     if any(kind in loops for kind in model.eq_type[model.eq_active0.astype(bool)]):
         raise _wrong("closed kinematic loops (connect, weld) are not supported")
     for field, name in list(named.items())[1:]:
-        body, joints = bodies[name], 0
-        while body != bodies[description.root] and body != 0:
-            joints += model.body_jntnum[body]
-            body = model.body_parentid[body]
-        if body == 0 or not joints:
+        line, root = lineage(model, bodies[name]), bodies[description.root]
+        limb = line[: line.index(root)] if root in line else []
+        if not np.any(model.body_jntnum[limb]):
             raise ConfigError(
                 f"the body {shown(name)} is no limb of the root {description.root!r}", field=field
             )
@@ -66,8 +64,8 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription) -> None:
 def _check_root(model: mujoco.MjModel, root: int) -> None:
     """The root hangs on the world by a free joint, and nothing else moves."""
     name, top = model.body(root).name, int(model.body_rootid[root])
-    bodies = [root, *_ancestors(model, root)]
-    above = [i for i in range(model.njnt) if model.jnt_bodyid[i] in bodies]
+    line = lineage(model, root)
+    above = [i for i in range(model.njnt) if model.jnt_bodyid[i] in line]
     kinds = [int(model.jnt_type[joint]) for joint in above]
     floating = [model.body(model.jnt_bodyid[i]).name for i in range(model.njnt)
                 if model.jnt_type[i] == FREE]  # fmt: skip
@@ -93,11 +91,12 @@ def _check_root(model: mujoco.MjModel, root: int) -> None:
     raise ConfigError(problem, field="root", choices=floating or None)
 
 
-def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
-    """The bodies between one and the world, the nearest first."""
+def lineage(model: mujoco.MjModel, body: int) -> list[int]:
+    """A body, and those between it and the world, the nearest first."""
     found = []
-    while (body := int(model.body_parentid[body])) != 0:
+    while body != 0:
         found.append(body)
+        body = int(model.body_parentid[body])
     return found
 
 

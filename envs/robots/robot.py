@@ -35,8 +35,8 @@ from .models.humanoid import humanoid_spec
 from .models.mjcf import pointing_to_scenes, read_mjcf
 from .models.mjcf_bounds import bound_cache
 from .models.urdf import read_urdf
-from .soles import Sole, build_sole, find_sole_plane, sole_geoms
-from .standing import centre_com, described_qpos, level_soles, turn_forward
+from .soles import Sole, find_sole_plane, sole_frame, sole_geoms
+from .standing import Stance, described_qpos
 
 BUILDERS = {"humanoid": humanoid_spec}
 TOUCH = 1e-9  # [m] by which the soles stand below z = 0, so that rounding loses no contact
@@ -179,21 +179,16 @@ def read_description(path: Path) -> RobotDescription:
         return build(RobotDescription, read_yaml(path), str(path))
     description = guess(path)
     feet = " and ".join(repr(foot.body) for foot in description.feet)
+    posture = description.posture
+    start = f"keyframe {posture.keyframe!r}" if posture.keyframe else "the zero posture"
+    bent = " with bent legs" if posture.joints else ""
     warnings.warn(
         f"{path}: without a description; guessed: root {description.root!r}, feet {feet}, "
-        f"{_posture_text(description)}; poise robot {shlex.quote(str(path))} writes the "
-        "description",
+        f"posture {start}{bent}; poise robot {shlex.quote(str(path))} writes the description",
         PoiseWarning,
         stacklevel=4,
     )
     return description
-
-
-def _posture_text(description: RobotDescription) -> str:
-    posture = description.posture
-    start = f"keyframe {posture.keyframe!r}" if posture.keyframe else "the zero posture"
-    bent = " with bent legs" if posture.joints else ""
-    return f"posture {start}{bent}"
 
 
 def _load(path: Path, terrain: Terrain, description: RobotDescription | None = None) -> Robot:
@@ -270,12 +265,15 @@ def _stand(
             with pointing_to_scenes(file, "pair"):
                 geoms.append(sole_geoms(model, bodies[i], foot.geoms, ground))
             planes.append(find_sole_plane(model, data, bodies[i], geoms[i]))
-    level_soles(model, data, bodies, planes)
+    stance = Stance(model, data, root, bodies, planes)
+    stance.level_soles()
     if description.posture.com == "middle":
-        centre_com(model, data, root, bodies, planes)
-    turn_forward(model, data, root, description.forward)
+        stance.centre_com()
+    stance.turn_forward(description.forward)
     soles = tuple(
-        build_sole(foot.name, foot.body, bodies[i], geoms[i], planes[i], data.xmat[bodies[i]])
+        Sole(
+            foot.name, foot.body, bodies[i], geoms[i], *sole_frame(planes[i], data.xmat[bodies[i]])
+        )
         for i, foot in enumerate(description.feet)
     )
     points = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position for s in soles]

@@ -131,22 +131,10 @@ def find_sole_plane(
     return SolePlane(normal=-down, points=points)
 
 
-def build_sole(
-    name: str,
-    body: str,
-    body_id: int,
-    geom_ids: tuple[int, ...],
-    plane: SolePlane,
-    xmat: np.ndarray,
-) -> Sole:
-    """The sole of a foot in the standing posture, the robot facing along the world's x axis.
+def sole_frame(plane: SolePlane, xmat: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, rotation and polygon, as of a `Sole`, of a foot that rests on a plane.
 
-    Args:
-        name: the foot's name.
-        body: the foot body's name; ``body_id`` its index.
-        geom_ids: the sole's geoms.
-        plane: where the foot rests.
-        xmat: (9,) orientation of the foot body in the world, as MuJoCo keeps it.
+    The robot faces along the world's x axis; `xmat` (9,) is the orientation of the foot body.
     """
     rotation = xmat.reshape(3, 3).T.copy()  # the world's axes in the foot frame
     points = plane.points @ rotation  # in the sole's axes, still about the foot body's origin
@@ -155,7 +143,7 @@ def build_sole(
     angles = np.arctan2(*(polygon - centre).T[::-1]) % (2 * np.pi)
     polygon = np.roll(polygon, -int(np.argmin(angles)), axis=0)  # starts at the front left
     position = rotation @ np.array([*centre, points[0, 2]])
-    return Sole(name, body, body_id, geom_ids, position, rotation, polygon - centre)
+    return position, rotation, polygon - centre
 
 
 def centroid(polygon: np.ndarray) -> np.ndarray:

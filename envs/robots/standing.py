@@ -1,6 +1,7 @@
 """The standing posture: both soles exactly flat on the ground, the robot facing along +x."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -9,7 +10,7 @@ from poise.configs.errors import ConfigError, shown
 
 from .actuators import SIMPLE_JOINTS
 from .description import RobotDescription, match_names
-from .soles import SolePlane, build_sole
+from .soles import SolePlane, sole_frame
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 MAX_CORRECTION = np.deg2rad(3.0)  # [rad] that levelling may change a joint
@@ -21,18 +22,12 @@ TOLERANCE = 1e-10  # [rad] and [m]
 
 
 def described_qpos(
-    model: mujoco.MjModel,
-    description: RobotDescription,
-    keyframes: dict[str, np.ndarray],
+    model: mujoco.MjModel, description: RobotDescription, keyframes: dict[str, np.ndarray]
 ) -> np.ndarray:
     """(nq,) the posture as described, not yet levelled.
 
-    Joints that the description leaves out stay within their range.
-
-    Args:
-        model: the robot.
-        description: its ``posture`` is used.
-        keyframes: keyframe name → qpos, of the source model.
+    Joints that the description leaves out stay within their range. `keyframes` are those of the
+    source model: name → qpos.
 
     Raises:
         ConfigError: an unknown keyframe or joint, or an angle out of the joint's range.
@@ -67,191 +62,166 @@ def described_qpos(
     return qpos
 
 
-def level_soles(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    feet: Sequence[int],
-    planes: Sequence[SolePlane],
-) -> None:
-    """Turn the leg joints of ``data.qpos`` a little so that both soles are level and equally high.
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """A robot whose `data.qpos` is changed until it stands; after each change its kinematics are
+    up to date.
 
-    Gauss–Newton with the smallest joint change, over the joints that move just one foot; the root
-    keeps its orientation.
-
-    Args:
-        model: the robot.
-        data: its ``qpos`` is changed; the kinematics are up to date afterwards.
-        feet: foot body ids.
-        planes: where each foot rests.
-
-    Raises:
-        ConfigError: the legs cannot do it within 3° per joint.
-    """
-    start = data.qpos.copy()
-    for _ in range(50):
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        residual, jacobian = _levelness(model, data, feet, planes)
-        if np.abs(residual).max() < TOLERANCE:
-            break
-        _turn(model, data, -np.linalg.pinv(jacobian, rcond=CUT_OFF) @ residual)
-    change = np.abs(data.qpos - start)[7:]
-    if np.abs(residual).max() >= TOLERANCE or change.max() > MAX_CORRECTION:
-        data.qpos[:] = start
-        mujoco.mj_kinematics(model, data)
-        first, _ = _levelness(model, data, feet, planes)
-        tilts = np.degrees(np.hypot(first[[0, 2]], first[[1, 3]]))
-        names = " and ".join(f"{model.body(body).name!r} by {tilt:.1f}°"
-                             for body, tilt in zip(feet, tilts, strict=True))  # fmt: skip
-        raise ConfigError(
-            "the soles cannot be made flat and equally high by turning leg joints by "
-            f"{np.degrees(MAX_CORRECTION):.0f}° at most: as described, they are tilted, {names}, "
-            f"and one is {1000.0 * abs(first[4]):.1f} mm higher; correct the standing posture",
-            field="posture",
-        )
-
-
-def centre_com(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    root: int,
-    feet: Sequence[int],
-    planes: Sequence[SolePlane],
-) -> None:
-    """Turn the leg joints of ``data.qpos`` so that the CoM is over the middle of the level soles.
-
-    Gauss–Newton as in `level_soles`; in the null space of level soles the CoM goes to the middle,
-    and the feet keep their places and their yaw relative to each other. The root keeps its
-    orientation, joints stay in their range.
-
-    Args:
-        model: the robot.
-        data: its ``qpos`` is changed; the kinematics are up to date afterwards.
+    Attributes:
         root: id of the root body.
-        feet: foot body ids.
+        feet: ids of the two foot bodies.
         planes: where each foot rests.
-
-    Raises:
-        ConfigError: the legs do not bring it there.
     """
-    start = data.qpos.copy()
-    simple = [i for i in range(model.njnt) if model.jnt_type[i] in SIMPLE_JOINTS]
-    limited = [i for i in simple if model.jnt_limited[i]]
-    places = model.jnt_qposadr[limited]
-    stance, _ = _stance(model, data, root, feet, planes)
-    goal = np.array([0.0, 0.0, *stance[2:]])
-    for _ in range(100):
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        level, rows = _levelness(model, data, feet, planes)
-        values, jacobian = _stance(model, data, root, feet, planes)
-        if max(np.abs(level).max(), np.abs(values - goal).max()) < TOLERANCE:
-            break
-        jacobian = np.where(np.any(rows != 0.0, axis=0), jacobian, 0.0)  # the dofs of one leg
-        inverse = np.linalg.pinv(rows, rcond=CUT_OFF)
-        change = -inverse @ level
-        free = np.eye(model.nv) - inverse @ rows
-        wish = goal - values - jacobian @ change
-        change += free @ np.linalg.pinv(jacobian @ free, rcond=CUT_OFF) @ wish
-        _turn(model, data, change)
-        data.qpos[places] = np.clip(data.qpos[places], *model.jnt_range[limited].T)
-    left = float(np.hypot(*values[:2]))
-    turned = float(np.abs(data.qpos - start)[7:].max())
-    if np.abs(level).max() >= TOLERANCE or left > CENTRED or turned > MAX_SHIFT:
-        raise ConfigError(
-            f"the legs do not bring the CoM over the middle of the soles: it is "
-            f"{1000.0 * np.hypot(*stance[:2]):.0f} mm away, and would be {1000.0 * left:.0f} mm "
-            f"away with a joint turned by {np.degrees(turned):.0f}° (at most "
-            f"{np.degrees(MAX_SHIFT):.0f}°): give a posture nearer to it",
-            field="posture.com",
-        )
 
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    root: int
+    feet: Sequence[int]
+    planes: Sequence[SolePlane]
 
-def _turn(model: mujoco.MjModel, data: mujoco.MjData, change: np.ndarray) -> None:
-    """Move the joints by (nv,), no joint by more than `STEP`."""
-    shorter = min(1.0, STEP / max(float(np.abs(change).max()), 1e-12))
-    mujoco.mj_integratePos(model, data.qpos, shorter * change, 1.0)
+    def level_soles(self) -> None:
+        """Turn the leg joints a little so that both soles are level and equally high.
 
+        Gauss–Newton with the smallest joint change, over the joints that move just one foot; the
+        root keeps its orientation.
 
-def _stance(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    root: int,
-    feet: Sequence[int],
-    planes: Sequence[SolePlane],
-) -> tuple[np.ndarray, np.ndarray]:
-    """(5,) the CoM's place from the middle of the soles, one sole's from the other, the difference
-    of their yaw; and its (5, nv) Jacobian."""
-    points, place_rows, turn_rows, yaws = [], [], [], []
-    for body, plane in zip(feet, planes, strict=True):
-        rotation = data.xmat[body].reshape(3, 3)
-        sole = build_sole("", "", body, (), plane, data.xmat[body])
-        points.append(data.xpos[body] + rotation @ sole.position)
-        place, turn = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        mujoco.mj_jac(model, data, place, turn, points[-1], body)
-        place_rows.append(place[:2])
-        turn_rows.append(turn[2])
-        axis = rotation[:, int(np.argmax(np.hypot(rotation[0], rotation[1])))]
-        yaws.append(np.arctan2(axis[1], axis[0]))
-    com = np.zeros((3, model.nv))
-    mujoco.mj_jacSubtreeCom(model, data, com, root)
-    middle = 0.5 * (points[0] + points[1])
-    apart = (points[0] - points[1])[:2]
-    values = [*(data.subtree_com[root] - middle)[:2], *apart, yaws[0] - yaws[1]]
-    rows = [com[:2] - 0.5 * (place_rows[0] + place_rows[1]), place_rows[0] - place_rows[1],
-            (turn_rows[0] - turn_rows[1])[None]]  # fmt: skip
-    return np.array(values), np.vstack(rows)
+        Raises:
+            ConfigError: the legs cannot do it within 3° per joint.
+        """
+        start = self.data.qpos.copy()
+        for _ in range(50):
+            self._update()
+            residual, jacobian = self._levelness()
+            if np.abs(residual).max() < TOLERANCE:
+                break
+            self._turn(-np.linalg.pinv(jacobian, rcond=CUT_OFF) @ residual)
+        change = np.abs(self.data.qpos - start)[7:]
+        if np.abs(residual).max() >= TOLERANCE or change.max() > MAX_CORRECTION:
+            self.data.qpos[:] = start
+            mujoco.mj_kinematics(self.model, self.data)
+            first, _ = self._levelness()
+            tilts = np.degrees(np.hypot(first[[0, 2]], first[[1, 3]]))
+            names = " and ".join(f"{self.model.body(body).name!r} by {tilt:.1f}°"
+                                 for body, tilt in zip(self.feet, tilts, strict=True))  # fmt: skip
+            raise ConfigError(
+                "the soles cannot be made flat and equally high by turning leg joints by "
+                f"{np.degrees(MAX_CORRECTION):.0f}° at most: as described, they are tilted, "
+                f"{names}, and one is {1000.0 * abs(first[4]):.1f} mm higher; correct the standing "
+                "posture",
+                field="posture",
+            )
 
+    def centre_com(self) -> None:
+        """Turn the leg joints so that the CoM is over the middle of the level soles.
 
-def _levelness(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    feet: Sequence[int],
-    planes: Sequence[SolePlane],
-) -> tuple[np.ndarray, np.ndarray]:
-    """(5,) tilt of both sole normals and height difference, and its (5, nv) Jacobian."""
-    tilts, heights, tilt_rows, height_rows = [], [], [], []
-    for body, plane in zip(feet, planes, strict=True):
-        rotation = data.xmat[body].reshape(3, 3)
-        normal = rotation @ plane.normal
-        point = data.xpos[body] + rotation @ plane.points.mean(0)
-        jac_pos, jac_rot = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        mujoco.mj_jac(model, data, jac_pos, jac_rot, point, body)
-        tilts.append(normal[:2])
-        tilt_rows.append(np.cross(jac_rot.T, normal).T[:2])  # ṅ = ω × n
-        heights.append(point[2])
-        height_rows.append(jac_pos[2])
-    moved = [np.any(rows != 0, axis=0) for rows in tilt_rows]
-    one_leg = moved[0] ^ moved[1]
-    residual = np.concatenate([*tilts, [heights[0] - heights[1]]])
-    jacobian = np.vstack([*tilt_rows, height_rows[0] - height_rows[1]])
-    return residual, np.where(one_leg, jacobian, 0.0)
+        Gauss–Newton as in `level_soles`; in the null space of level soles the CoM goes to the
+        middle, and the feet keep their places and their yaw relative to each other. The root keeps
+        its orientation, joints stay in their range.
 
+        Raises:
+            ConfigError: the legs do not bring it there.
+        """
+        model, data = self.model, self.data
+        start = data.qpos.copy()
+        simple = [i for i in range(model.njnt) if model.jnt_type[i] in SIMPLE_JOINTS]
+        limited = [i for i in simple if model.jnt_limited[i]]
+        places = model.jnt_qposadr[limited]
+        stance, _ = self._com_and_feet()
+        goal = np.array([0.0, 0.0, *stance[2:]])
+        for _ in range(100):
+            self._update()
+            level, rows = self._levelness()
+            values, jacobian = self._com_and_feet()
+            if max(np.abs(level).max(), np.abs(values - goal).max()) < TOLERANCE:
+                break
+            jacobian = np.where(np.any(rows != 0.0, axis=0), jacobian, 0.0)  # the dofs of one leg
+            inverse = np.linalg.pinv(rows, rcond=CUT_OFF)
+            change = -inverse @ level
+            free = np.eye(model.nv) - inverse @ rows
+            wish = goal - values - jacobian @ change
+            change += free @ np.linalg.pinv(jacobian @ free, rcond=CUT_OFF) @ wish
+            self._turn(change)
+            data.qpos[places] = np.clip(data.qpos[places], *model.jnt_range[limited].T)
+        left = float(np.hypot(*values[:2]))
+        turned = float(np.abs(data.qpos - start)[7:].max())
+        if np.abs(level).max() >= TOLERANCE or left > CENTRED or turned > MAX_SHIFT:
+            raise ConfigError(
+                f"the legs do not bring the CoM over the middle of the soles: it is "
+                f"{1000.0 * np.hypot(*stance[:2]):.0f} mm away, and would be {1000.0 * left:.0f} "
+                f"mm away with a joint turned by {np.degrees(turned):.0f}° (at most "
+                f"{np.degrees(MAX_SHIFT):.0f}°): give a posture nearer to it",
+                field="posture.com",
+            )
 
-def turn_forward(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    root: int,
-    forward: tuple[float, float, float],
-) -> None:
-    """Turn the robot about the vertical until its forward axis points along +x.
+    def turn_forward(self, forward: tuple[float, float, float]) -> None:
+        """Turn the robot about the vertical until `forward`, in the root's frame, points along +x.
 
-    Args:
-        model: the robot.
-        data: its ``qpos`` is changed; the kinematics are up to date afterwards.
-        root: id of the root body.
-        forward: forward direction in the root body's frame.
+        Raises:
+            ConfigError: this axis is steeper than 60° in the standing posture.
+        """
+        data = self.data
+        axis = data.xmat[self.root].reshape(3, 3) @ np.asarray(forward)
+        if np.hypot(axis[0], axis[1]) < 0.5 * np.linalg.norm(axis):
+            raise ConfigError(
+                "this axis of the root body is not level in the standing posture", field="forward"
+            )
+        half = -0.5 * np.arctan2(axis[1], axis[0])
+        turn = np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
+        mujoco.mju_mulQuat(data.qpos[3:7], turn, data.qpos[3:7].copy())
+        mujoco.mj_kinematics(self.model, data)
 
-    Raises:
-        ConfigError: the forward axis is steeper than 60° in the standing posture.
-    """
-    axis = data.xmat[root].reshape(3, 3) @ np.asarray(forward)
-    if np.hypot(axis[0], axis[1]) < 0.5 * np.linalg.norm(axis):
-        raise ConfigError(
-            "this axis of the root body is not level in the standing posture",
-            field="forward",
-        )
-    half = -0.5 * np.arctan2(axis[1], axis[0])
-    turn = np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
-    mujoco.mju_mulQuat(data.qpos[3:7], turn, data.qpos[3:7].copy())
-    mujoco.mj_kinematics(model, data)
+    def _update(self) -> None:
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+
+    def _turn(self, change: np.ndarray) -> None:
+        """Move the joints by (nv,), no joint by more than `STEP`."""
+        shorter = min(1.0, STEP / max(float(np.abs(change).max()), 1e-12))
+        mujoco.mj_integratePos(self.model, self.data.qpos, shorter * change, 1.0)
+
+    def _jacobians(self, body: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(3, nv) of a point of a body [m], and of the body's turning."""
+        place, turn = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jac(self.model, self.data, place, turn, point, body)
+        return place, turn
+
+    def _com_and_feet(self) -> tuple[np.ndarray, np.ndarray]:
+        """(5,) the CoM's place from the middle of the soles, one sole's from the other, the
+        difference of their yaw; and its (5, nv) Jacobian."""
+        data = self.data
+        points, place_rows, turn_rows, yaws = [], [], [], []
+        for body, plane in zip(self.feet, self.planes, strict=True):
+            rotation = data.xmat[body].reshape(3, 3)
+            position, _, _ = sole_frame(plane, data.xmat[body])
+            points.append(data.xpos[body] + rotation @ position)
+            place, turn = self._jacobians(body, points[-1])
+            place_rows.append(place[:2])
+            turn_rows.append(turn[2])
+            axis = rotation[:, int(np.argmax(np.hypot(rotation[0], rotation[1])))]
+            yaws.append(np.arctan2(axis[1], axis[0]))
+        com = np.zeros((3, self.model.nv))
+        mujoco.mj_jacSubtreeCom(self.model, data, com, self.root)
+        middle = 0.5 * (points[0] + points[1])
+        apart = (points[0] - points[1])[:2]
+        values = [*(data.subtree_com[self.root] - middle)[:2], *apart, yaws[0] - yaws[1]]
+        rows = [com[:2] - 0.5 * (place_rows[0] + place_rows[1]), place_rows[0] - place_rows[1],
+                (turn_rows[0] - turn_rows[1])[None]]  # fmt: skip
+        return np.array(values), np.vstack(rows)
+
+    def _levelness(self) -> tuple[np.ndarray, np.ndarray]:
+        """(5,) tilt of both sole normals and height difference, and its (5, nv) Jacobian."""
+        tilts, heights, tilt_rows, height_rows = [], [], [], []
+        for body, plane in zip(self.feet, self.planes, strict=True):
+            rotation = self.data.xmat[body].reshape(3, 3)
+            normal = rotation @ plane.normal
+            point = self.data.xpos[body] + rotation @ plane.points.mean(0)
+            jac_pos, jac_rot = self._jacobians(body, point)
+            tilts.append(normal[:2])
+            tilt_rows.append(np.cross(jac_rot.T, normal).T[:2])  # ṅ = ω × n
+            heights.append(point[2])
+            height_rows.append(jac_pos[2])
+        moved = [np.any(rows != 0, axis=0) for rows in tilt_rows]
+        one_leg = moved[0] ^ moved[1]
+        residual = np.concatenate([*tilts, [heights[0] - heights[1]]])
+        jacobian = np.vstack([*tilt_rows, height_rows[0] - height_rows[1]])
+        return residual, np.where(one_leg, jacobian, 0.0)

@@ -9,7 +9,7 @@ import mujoco
 import yaml
 
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.robots.soles import build_sole, find_sole_plane, sole_geoms
+from poise.envs.robots.soles import Sole, find_sole_plane, sole_frame, sole_geoms
 
 LEG_JOINTS = (  # name, body, axis, range [°]
     ("hip_x", "hip", "1 0 0", "-40 40"),
@@ -106,7 +106,8 @@ def _with_all_soles(robot: Robot, names: list[str]) -> Robot:
         body = model.body(f"{name}_foot").id
         geoms = sole_geoms(model, body, (), robot.ground_geom_id)
         plane = find_sole_plane(model, data, body, geoms)
-        soles.append(build_sole(name, f"{name}_foot", body, geoms, plane, data.xmat[body]))
+        frame = sole_frame(plane, data.xmat[body])
+        soles.append(Sole(name, f"{name}_foot", body, geoms, *frame))
     # the counters of contacts are not read here: any address will do
     sensors = robot.sensor_adr | dict.fromkeys(names, robot.sensor_adr["left"])
     return replace(robot, soles=tuple(soles), sensor_adr=sensors)

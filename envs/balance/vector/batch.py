@@ -144,7 +144,9 @@ class EnvBatch(Copyable):
             turns.play_all(self._helpers)
         else:
             again = set(restarted)
-            self._share(lambda i: self._restart(i) if i in again else self._play(i), everyone)
+            self._share(
+                lambda i: self._restart(i) if i in again else self.envs[i].advance(), everyone
+            )
         self._report()
         for i in played if turns is not None else ():
             self.envs[i].check()
@@ -189,9 +191,6 @@ class EnvBatch(Copyable):
                 env.check_action(vector)  # raises, and names the entries
         record.last_action[live] = record.action[live]
         record.action[live] = np.minimum(np.maximum(vectors, -1.0), 1.0)
-
-    def _play(self, i: int) -> None:
-        self.envs[i].advance()
 
     def _restart(
         self, i: int, seed: int | None = None, options: dict[str, object] | None = None

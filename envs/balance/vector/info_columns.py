@@ -1,7 +1,7 @@
 """The `info` of many environments at once: an array for each key."""
 
 from collections.abc import Sequence
-from typing import TypedDict
+from typing import Any
 
 import numpy as np
 
@@ -9,17 +9,6 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.episode import FAILURES, QUIET_STEPS, SATURATED, TICKS, EpisodeArrays
 from poise.envs.balance.mdp.reward import REWARD_TERMS
 from poise.envs.compiled.copies import Copyable
-
-
-class InfoArrays(TypedDict):
-    """The entries of `BalanceEnv.info` of n environments, each (n,) but for the last one."""
-
-    reward_terms: dict[str, np.ndarray]
-    push: np.ndarray  # of lists
-    is_success: np.ndarray
-    solver_failures: np.ndarray
-    torque_saturation: np.ndarray
-    root_wrench: np.ndarray  # (n, 6)
 
 
 class InfoColumns(Copyable):
@@ -34,8 +23,8 @@ class InfoColumns(Copyable):
         self._pushes: list[object] = [None] * len(envs)  # those described
         self._descriptions = np.empty(len(envs), dtype=object)
 
-    def read(self) -> InfoArrays:
-        """The columns of the last step."""
+    def read(self) -> dict[str, Any]:
+        """The columns (n,) of the last step: "push" of lists, "root_wrench" (n, 6)."""
         record, metrics = self.record, self.record.metrics
         for i, env in enumerate(self.envs):
             pushes = env.simulation.pushes

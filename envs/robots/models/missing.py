@@ -112,7 +112,7 @@ def _drop_meshes(spec: mujoco.MjSpec, missing: dict[str, str], feet: tuple[str, 
     bodies = []
     for geom in [geom for geom in spec.geoms if geom.meshname in missing]:
         body = geom.parent
-        solid = bool(geom.contype or geom.conaffinity) or geom.name in _paired(spec)
+        solid = bool(geom.contype or geom.conaffinity) or geom.name in paired_geoms(spec)
         massive = geom.mass > 0 if np.isfinite(geom.mass) else geom.density > 0
         if solid and body.name in feet:
             reason = f"the foot {body.name!r} collides with it"
@@ -133,7 +133,7 @@ def _drop_meshes(spec: mujoco.MjSpec, missing: dict[str, str], feet: tuple[str, 
     return list(dict.fromkeys(bodies))
 
 
-def _paired(spec: mujoco.MjSpec) -> set[str]:
+def paired_geoms(spec: mujoco.MjSpec) -> set[str]:
     """Geoms that collide by a contact pair."""
     return {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
 
