@@ -22,7 +22,7 @@ from poise.envs.physics.simulation import Simulation, World
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot, on_terrain
 from poise.envs.sensing.estimator import EstimatedState
-from poise.envs.sensing.measurement import allocate_rings
+from poise.envs.sensing.measurement import Rings
 from poise.envs.sensing.sensed import SensedRobot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.rendered import RenderedEnv
@@ -39,13 +39,11 @@ from .episode import (
     EpisodeArrays,
     Judge,
     StepEnd,
-    allocate_episode,
     begin_episode,
-    make_judge,
 )
 from .mdp.docstrings import filled
 from .mdp.observation import Term, Terms, View, frames, mirror_terms, observer, scales
-from .mdp.reward import REWARD_TERMS
+from .mdp.reward import REWARD_TERMS, RewardView, rewards
 from .mdp.termination import episode_limits
 from .mdp.terms import TERMS, MeasuredView
 from .servos import holding_torques
@@ -105,8 +103,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         size = sum(term.size for term in self.terms)
         #: entries of the observation that a policy sees; the others are privileged
         self.seen = sum(term.size for term in seen)
-        sizes = len(REWARD_TERMS), len(self.robot.soles), self.robot.model.nu
-        self.episode = allocate_episode(len(self.action_names), size, *sizes)
+        sizes = {"na": len(self.action_names), "no": size, "terms": len(REWARD_TERMS)}
+        self.episode = EpisodeArrays.allocate(sizes | self.simulation.sizes)
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self._described: tuple[object, list[PushInfo]] = None, []  # pushes, their infos
@@ -185,7 +183,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             return view
         if isinstance(source, EstimatedState):
             return MeasuredView(view, source.sensors.rings, source.belief.steps, False)
-        return MeasuredView(view, allocate_rings(self.simulation), guarded_zeros(1, int), True)
+        return MeasuredView(
+            view, Rings.allocate(self.simulation.sizes), guarded_zeros(1, int), True
+        )
 
     def _true_view(self, kind: type[Block], out: np.ndarray) -> Block:
         """The block of a term that fills `out` from the true robot's state."""
@@ -209,10 +209,24 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     def _judge(self) -> Judge:
         """The block that judges the policy steps of this environment."""
-        return make_judge(
-            self.simulation.world(), self.episode, self.scales, self.limits,
-            self.config.reward, self._references()[0], self._velocity_error(),
-        )  # fmt: skip
+        world, e = self.simulation.world(), self.episode
+        known: dict[str, Any] = {"robot": world.robot, "state": world.state, "views": world.views}
+        view = RewardView(
+            **known,
+            scales=self.scales,
+            limits=self.limits,
+            q_ref=self._references()[0],
+            action=e.action,
+            last_action=e.last_action,
+            velocity_error=self._velocity_error(),
+        )
+        return Judge(
+            **known,
+            clock=world.clock,
+            limits=self.limits,
+            rewards=rewards(self.config.reward, view),
+            episode=e,
+        )
 
     def step_end(self) -> StepEnd:
         """The block that ends a policy step; a new one when `simulation.world()` is."""

@@ -1,19 +1,17 @@
 """The record of an episode: fall, quiet time, effort, excursions; and the reward."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
-from poise.envs.physics.simulation import World
 
-from .mdp.observation import Scales
-from .mdp.reward import Rewards, RewardView, RewardWeights, rewards, sum_rewards
+from .mdp.reward import Rewards, sum_rewards
 from .mdp.termination import Limits, has_diverged, has_fallen, uprightness
 
 (
@@ -43,42 +41,20 @@ METRICS = 18
 class EpisodeArrays(Block):
     """The record that compiled steps write of the running episode."""
 
-    action: np.ndarray  # (na,)
-    last_action: np.ndarray  # (na,)
-    observation: np.ndarray  # (no,)
-    reward: np.ndarray  # (1,) of the last policy step
-    reward_terms: np.ndarray  # (terms,) weighted; their sum is the reward
-    metrics: np.ndarray  # (METRICS,)
-    last_torque: np.ndarray  # (nu,) of the last control tick [N·m]
-    root_wrench: np.ndarray  # (6,) of a soft root in the last tick [N, N·m]
-    sole_start: np.ndarray  # (nc, 2)
-    sole_rest: np.ndarray  # (nc, 2) where the soles were when the running quiet time began
-    edges: np.ndarray  # (nc,) 1 where a foot touched an edge in the last policy step
-    steps: np.ndarray  # (1,) int: policy steps since the reset
-    running: np.ndarray  # (1,) int: whether there may be another one
-    ticks: np.ndarray  # (1,) int: control ticks of the running policy step
-
-
-def allocate_episode(
-    actions: int, observations: int, terms: int, nc: int, nu: int
-) -> EpisodeArrays:
-    """Zeroed storage: as many entries of each as named, `nc` soles and `nu` motors."""
-    return EpisodeArrays(
-        action=guarded_zeros(actions),
-        last_action=guarded_zeros(actions),
-        observation=guarded_zeros(observations),
-        reward=guarded_zeros(1),
-        reward_terms=guarded_zeros(terms),
-        metrics=guarded_zeros(METRICS),
-        last_torque=guarded_zeros(nu),
-        root_wrench=guarded_zeros(6),
-        sole_start=guarded_zeros((nc, 2)),
-        sole_rest=guarded_zeros((nc, 2)),
-        edges=guarded_zeros(nc),
-        steps=guarded_zeros(1, dtype=np.int64),
-        running=guarded_zeros(1, dtype=np.int64),
-        ticks=guarded_zeros(1, dtype=np.int64),
-    )
+    action: Annotated[np.ndarray, "na"]
+    last_action: Annotated[np.ndarray, "na"]
+    observation: Annotated[np.ndarray, "no"]
+    reward: Annotated[np.ndarray, 1]  # of the last policy step
+    reward_terms: Annotated[np.ndarray, "terms"]  # weighted; their sum is the reward
+    metrics: Annotated[np.ndarray, METRICS]
+    last_torque: Annotated[np.ndarray, "nu"]  # of the last control tick [N·m]
+    root_wrench: Annotated[np.ndarray, 6]  # of a soft root in the last tick [N, N·m]
+    sole_start: Annotated[np.ndarray, "nc", 2]
+    sole_rest: Annotated[np.ndarray, "nc", 2]  # where they were when the running quiet time began
+    edges: Annotated[np.ndarray, "nc"]  # 1 where a foot touched an edge in the last policy step
+    steps: Annotated[np.ndarray, 1, np.int64]  # policy steps since the reset
+    running: Annotated[np.ndarray, 1, np.int64]  # whether there may be another one
+    ticks: Annotated[np.ndarray, 1, np.int64]  # control ticks of the running policy step
 
 
 @compiled
@@ -133,44 +109,6 @@ class Judge(Block):
     limits: Limits
     rewards: Rewards
     episode: EpisodeArrays
-
-
-def make_judge(
-    world: World,
-    episode: EpisodeArrays,
-    scales: Scales,
-    limits: Limits,
-    weights: RewardWeights,
-    q_ref: np.ndarray,
-    velocity_error: np.ndarray,
-) -> Judge:
-    """Return the block that judges the policy steps of an environment.
-
-    Args:
-        weights: of the reward's terms.
-        q_ref: (nj,) joint positions of the reference [rad].
-        velocity_error: (3,) see `RewardView`.
-    """
-    view = RewardView(
-        robot=world.robot,
-        state=world.state,
-        scales=scales,
-        limits=limits,
-        q_ref=q_ref,
-        views=world.views,
-        action=episode.action,
-        last_action=episode.last_action,
-        velocity_error=velocity_error,
-    )
-    return Judge(
-        robot=world.robot,
-        views=world.views,
-        state=world.state,
-        clock=world.clock,
-        limits=limits,
-        rewards=rewards(weights, view),
-        episode=episode,
-    )
 
 
 @compiled

@@ -5,9 +5,11 @@ compiles all of them. A `Block` is handed over as a pointer: its arrays' address
 its numbers, lie one after the other in memory, and only what a function uses is read.
 """
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Any
+from typing import Annotated, Any, Self, get_origin, get_type_hints
 
 import llvmlite.ir
 import numba
@@ -26,6 +28,7 @@ from numba.extending import (
 from numba.np import numpy_support
 
 from .copies import portable
+from .memory import guarded_zeros
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,22 @@ class Block:
         object.__setattr__(self, "_memory", memory)
         object.__setattr__(self, "_address", memory.ctypes.data)
         object.__setattr__(self, "_type", BlockType(type(self).__name__, tuple(members)))
+
+    @classmethod
+    def allocate(cls, sizes: Mapping[str, int] | None = None, **members: Any) -> Self:
+        """A block of these members, and of zeros for every other array, whose shape is annotated.
+
+        `Annotated[np.ndarray, "nv+1", 3]` is (nv + 1, 3), of which `sizes` has nv; "6nc" is six
+        times nc. A type at the end is that of the numbers, which are floats by default.
+        """
+        for name, kind in get_type_hints(cls, include_extras=True).items():
+            if name not in members and get_origin(kind) is Annotated:
+                *shape, last = kind.__metadata__
+                typed = isinstance(last, type)
+                shape += [] if typed else [last]
+                lengths = tuple(_length(part, sizes or {}) for part in shape)
+                members[name] = guarded_zeros(lengths, last if typed else float)
+        return cls(**members)
 
     @property
     def address(self) -> int:
@@ -74,6 +93,15 @@ class Block:
 
     def __copy__(self) -> Any:
         return type(self)(*self.members())
+
+
+def _length(part: int | str, sizes: Mapping[str, int]) -> int:
+    """The number that a part of an annotated shape stands for."""
+    if isinstance(part, int):
+        return part
+    found = re.fullmatch(r"(\d*)([a-z]+)([+-]\d+)?", part)
+    assert found is not None, part
+    return int(found[1] or 1) * sizes[found[2]] + int(found[3] or 0)
 
 
 def _words(value: Any) -> tuple[types.Type, list[int]]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import chain
+from typing import Annotated
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.easing import eased
 from poise.envs.compiled.maths.noise import uniform
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.description import match_names
 from poise.envs.robots.model_check import lineage
 from poise.envs.robots.robot import Robot
@@ -65,15 +65,15 @@ class MovedArms(Block):
     robot: RobotArrays
     views: SimViews
     motors: np.ndarray  # (n,) int: of the arms
-    moved: np.ndarray  # (1,) int: 1 where somebody moves them
-    step: np.ndarray  # (1,) int: physics steps since the reset
+    moved: Annotated[np.ndarray, 1, np.int64]  # 1 where somebody moves them
+    step: Annotated[np.ndarray, 1, np.int64]  # physics steps since the reset
     period: int  # physics steps from one posture to the next
-    seed: np.ndarray  # (1,) uint64, see `uniform`
+    seed: Annotated[np.ndarray, 1, np.uint64]  # see `uniform`
     stand: np.ndarray  # (n,) standing posture [rad]
     reach: np.ndarray  # (n, 2) the way from there to the joint's limits [rad]
-    part: np.ndarray  # (1,) of that way
-    last: np.ndarray  # (n,) posture that is left [rad]
-    goal: np.ndarray  # (n,) posture that is next [rad]
+    part: Annotated[np.ndarray, 1]  # of that way
+    last: Annotated[np.ndarray, "n"]  # posture that is left [rad]
+    goal: Annotated[np.ndarray, "n"]  # posture that is next [rad]
     inertia: np.ndarray  # (n,) of each joint, standing [kg·m²]
 
 
@@ -83,23 +83,17 @@ def allocate_arms(simulation: Simulation, known: Simulation) -> MovedArms:
     joints = set(chain.from_iterable(arm.joints for arm in find_arms(robot)))
     motors = [i for i, dof in enumerate(robot.motor_dofs) if dof - 6 in joints]
     dofs = robot.motor_dofs[motors]
-    stand, zeros = robot.standing_qpos[dofs + 1], guarded_zeros
+    stand = robot.standing_qpos[dofs + 1]
     span = robot.joint_range[dofs - 6] - stand[:, None]
-    inertia = np.diag(known.state.M)[dofs]
-    return MovedArms(
+    return MovedArms.allocate(
+        {"n": len(motors)},
         robot=simulation.arrays,
         views=simulation.views,
         motors=np.array(motors, dtype=np.int64),
-        moved=zeros(1, np.int64),
-        step=zeros(1, np.int64),
         period=round(PERIOD / simulation.arrays.timestep),
-        seed=zeros(1, np.uint64),
         stand=stand,
         reach=np.clip(span, -np.pi, np.pi),
-        part=zeros(1),
-        last=zeros(len(motors)),
-        goal=zeros(len(motors)),
-        inertia=inertia,
+        inertia=np.diag(known.state.M)[dofs],
     )
 
 

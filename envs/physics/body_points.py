@@ -1,7 +1,7 @@
 """Points fixed to a body: where they are, how they move, and the Jacobian of both."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import mujoco
 import numpy as np
@@ -9,7 +9,6 @@ import numpy as np
 from poise.configs.errors import ConfigError, shown
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .arrays import dof_chain
@@ -25,10 +24,10 @@ class BodyPoint(Block):
     body: int
     offset: np.ndarray  # (3,) from the body's origin, in its axes [m]
     chain: np.ndarray  # (k,) int: the degrees of freedom that move the body
-    position: np.ndarray  # (3,) world [m]
-    J: np.ndarray  # (6, nv) linear, then angular velocity, world axes
-    J_v: np.ndarray  # (6,)
-    Jdot_v: np.ndarray  # (6,)
+    position: Annotated[np.ndarray, 3]  # world [m]
+    J: Annotated[np.ndarray, 6, "nv"]  # linear, then angular velocity, world axes
+    J_v: Annotated[np.ndarray, 6]
+    Jdot_v: Annotated[np.ndarray, 6]
 
 
 def body_point(robot: Robot, body: str, offset: tuple[float, float, float]) -> BodyPoint:
@@ -40,15 +39,11 @@ def body_point(robot: Robot, body: str, offset: tuple[float, float, float]) -> B
     moving = {model.body(i).name: i for i in range(1, model.nbody) if model.body_weldid[i] > 0}
     if body not in moving:
         raise ConfigError(f"the robot has no body {shown(body)}", field="body", choices=moving)
-    nv = model.nv
-    return BodyPoint(
+    return BodyPoint.allocate(
+        {"nv": model.nv},
         body=moving[body],
         offset=np.array(offset, dtype=float),
         chain=np.array(dof_chain(model, moving[body]), dtype=np.int64),
-        position=guarded_zeros(3),
-        J=guarded_zeros((6, nv)),
-        J_v=guarded_zeros(6),
-        Jdot_v=guarded_zeros(6),
     )
 
 

@@ -7,6 +7,7 @@ matrix [Orin08] and its bias without building either.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -31,87 +32,51 @@ EDGE = 0.005  # [m] between surfaces from which their border is an edge
 class StateArrays(Block):
     """Storage of one robot state; see `RobotState` for the meaning of each name."""
 
-    qpos: np.ndarray  # (nv + 1,)
-    qvel: np.ndarray  # (nv,)
-    M: np.ndarray  # (nv, nv)
-    h: np.ndarray  # (nv,)
-    root_axes: np.ndarray  # (3, 3)
-    com: np.ndarray  # (3,)
-    com_vel: np.ndarray  # (3,)
-    momentum: np.ndarray  # (6,)
-    A: np.ndarray  # (6, nv)
-    A_bias: np.ndarray  # (6,)
-    load: np.ndarray  # (3,) that is believed to last: force f_z, moments n_x, n_y about the CoM
-    friction: np.ndarray  # (1,) of the ground that is believed, over the model's
-    J: np.ndarray  # (6 nc, nv)
-    Jdot_v: np.ndarray  # (6 nc,)
-    J_v: np.ndarray  # (6 nc,)
-    sole_point: np.ndarray  # (nc, 3)
-    sole_axes: np.ndarray  # (nc, 3, 3)
-    origin: np.ndarray  # (3,)
-    heading: np.ndarray  # (2,)
-    contact_wrench: np.ndarray  # (6,)
-    cop: np.ndarray  # (2,)
-    capture_point: np.ndarray  # (2,)
-    omega: np.ndarray  # (1,)
-    contacts: np.ndarray  # (nc,)
-    other_contacts: np.ndarray  # (1,)
-    support: np.ndarray  # (8 nc, 2)
-    support_size: np.ndarray  # (1,) int
-    body_position: np.ndarray  # (nb, 3)
-    body_axes: np.ndarray  # (nb, 3, 3)
-    dof_axes: np.ndarray  # (nv, 6)
-    dof_axes_dot: np.ndarray  # (nv, 6)
-    tree_com: np.ndarray  # (3,)
-    ground: np.ndarray  # (nc,)
-    edges: np.ndarray  # (nc,)
+    qpos: Annotated[np.ndarray, "nv+1"]
+    qvel: Annotated[np.ndarray, "nv"]
+    M: Annotated[np.ndarray, "nv", "nv"]
+    h: Annotated[np.ndarray, "nv"]
+    root_axes: Annotated[np.ndarray, 3, 3]
+    com: Annotated[np.ndarray, 3]
+    com_vel: Annotated[np.ndarray, 3]
+    momentum: Annotated[np.ndarray, 6]
+    A: Annotated[np.ndarray, 6, "nv"]
+    A_bias: Annotated[np.ndarray, 6]
+    load: Annotated[np.ndarray, 3]  # that is believed to last: f_z, and n_x, n_y about the CoM
+    friction: Annotated[np.ndarray, 1]  # of the ground that is believed, over the model's
+    J: Annotated[np.ndarray, "6nc", "nv"]
+    Jdot_v: Annotated[np.ndarray, "6nc"]
+    J_v: Annotated[np.ndarray, "6nc"]
+    sole_point: Annotated[np.ndarray, "nc", 3]
+    sole_axes: Annotated[np.ndarray, "nc", 3, 3]
+    origin: Annotated[np.ndarray, 3]
+    heading: Annotated[np.ndarray, 2]
+    contact_wrench: Annotated[np.ndarray, 6]
+    cop: Annotated[np.ndarray, 2]
+    capture_point: Annotated[np.ndarray, 2]
+    omega: Annotated[np.ndarray, 1]
+    contacts: Annotated[np.ndarray, "nc"]
+    other_contacts: Annotated[np.ndarray, 1]
+    support: Annotated[np.ndarray, "corners", 2]
+    support_size: Annotated[np.ndarray, 1, np.int64]
+    body_position: Annotated[np.ndarray, "nb", 3]
+    body_axes: Annotated[np.ndarray, "nb", 3, 3]
+    dof_axes: Annotated[np.ndarray, "nv", 6]
+    dof_axes_dot: Annotated[np.ndarray, "nv", 6]
+    tree_com: Annotated[np.ndarray, 3]
+    ground: Annotated[np.ndarray, "nc"]
+    edges: Annotated[np.ndarray, "nc"]
     motor_q: np.ndarray  # (nv − 6,) joint positions and velocities as the motors read them now:
     motor_dq: np.ndarray  # (nv − 6,) those of qpos and qvel, or what encoders give
 
 
 def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
     """Zeroed storage for `nv` degrees of freedom, `nc` soles and `nb` bodies, the world's too."""
-    zeros = guarded_zeros
-    qpos, qvel, friction = zeros(nv + 1), zeros(nv), zeros(1)
-    friction[0] = 1.0
-    return StateArrays(
-        qpos=qpos,
-        qvel=qvel,
-        M=zeros((nv, nv)),
-        h=zeros(nv),
-        root_axes=zeros((3, 3)),
-        com=zeros(3),
-        com_vel=zeros(3),
-        momentum=zeros(6),
-        A=zeros((6, nv)),
-        A_bias=zeros(6),
-        load=zeros(3),
-        friction=friction,
-        J=zeros((6 * nc, nv)),
-        Jdot_v=zeros(6 * nc),
-        J_v=zeros(6 * nc),
-        sole_point=zeros((nc, 3)),
-        sole_axes=zeros((nc, 3, 3)),
-        origin=zeros(3),
-        heading=zeros(2),
-        contact_wrench=zeros(6),
-        cop=zeros(2),
-        capture_point=zeros(2),
-        omega=zeros(1),
-        contacts=zeros(nc),
-        other_contacts=zeros(1),
-        support=zeros((MAX_VERTICES * nc, 2)),
-        support_size=zeros(1, dtype=np.int64),
-        body_position=zeros((nb, 3)),
-        body_axes=zeros((nb, 3, 3)),
-        dof_axes=zeros((nv, 6)),
-        dof_axes_dot=zeros((nv, 6)),
-        tree_com=zeros(3),
-        ground=zeros(nc),
-        edges=zeros(nc),
-        motor_q=qpos[7:],
-        motor_dq=qvel[6:],
-    )
+    sizes = {"nv": nv, "nc": nc, "nb": nb, "corners": MAX_VERTICES * nc}
+    qpos, qvel = guarded_zeros(nv + 1), guarded_zeros(nv)
+    s = StateArrays.allocate(sizes, qpos=qpos, qvel=qvel, motor_q=qpos[7:], motor_dq=qvel[6:])
+    s.friction[0] = 1.0
+    return s
 
 
 @compiled

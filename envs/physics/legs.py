@@ -17,25 +17,18 @@ ANKLE = 1.0 / 3.0  # of the height of a leg's first joint: joints below belong t
 class Leg:
     """A leg in the standing posture: the joints that move one foot and not the other.
 
-    Attributes:
-        foot: the foot's name.
-        joints: from the trunk to the foot.
-        knee: the joint between the last two of three or more that turn about the robot's left;
-            None where there are fewer.
-        knee_bend: angle between the lines from hip to knee and from knee to ankle [deg].
-        hip, ankle: the joints before and after the knee that turn about the robot's left, likewise.
-        ankle_pitch, ankle_roll: whether a joint of the ankle turns about the robot's left, about
-            its forward direction.
+    Hip, knee and ankle are the last three that turn about the robot's left; None where there are
+    fewer.
     """
 
-    foot: str
-    joints: tuple[str, ...]
+    foot: str  #: the foot's name
+    joints: tuple[str, ...]  #: from the trunk to the foot
     knee: str | None
-    knee_bend: float | None
+    knee_bend: float | None  #: between the lines from hip to knee and from knee to ankle [deg]
     hip: str | None
     ankle: str | None
-    ankle_pitch: bool
-    ankle_roll: bool
+    ankle_pitch: bool  #: whether a joint of the ankle turns about the robot's left
+    ankle_roll: bool  #: whether one turns about its forward direction
 
 
 def standing_data(robot: Robot) -> mujoco.MjData:

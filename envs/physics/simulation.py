@@ -118,6 +118,12 @@ class Simulation(Copyable):
         return self._world
 
     @property
+    def sizes(self) -> dict[str, int]:
+        """What `Block.allocate` takes: nq, nv, nj joints, nu motors, nc soles."""
+        nq, nv, nu = self.model.nq, self.model.nv, self.model.nu
+        return {"nq": nq, "nv": nv, "nj": nv - 6, "nu": nu, "nc": len(self.robot.soles)}
+
+    @property
     def time(self) -> float:
         """Seconds since the reset."""
         return float(self.clock[0] * self.arrays.timestep)

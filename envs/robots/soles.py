@@ -21,25 +21,16 @@ RIM_POINTS = 16  # by which the rim of a cylinder is sampled
 
 @dataclass(frozen=True)
 class Sole:
-    """A flat sole, fixed to a foot body.
+    """A flat sole, fixed to a foot body. In the standing posture its x axis points to the robot's
+    front, z up."""
 
-    Attributes:
-        name: the foot's name in the description.
-        body: name of the foot body; ``body_id`` is its index.
-        geom_ids: the collision geoms that make the sole.
-        position: (3,) reference point in the foot body's frame [m]: the polygon's centroid.
-        rotation: (3, 3) columns are the sole's axes in the foot body's frame. In the standing
-            posture x points to the robot's front, z up.
-        polygon: (k, 2) counter-clockwise vertices in the sole frame [m], 3 ≤ k ≤ 8.
-    """
-
-    name: str
-    body: str
-    body_id: int
-    geom_ids: tuple[int, ...]
-    position: np.ndarray
-    rotation: np.ndarray
-    polygon: np.ndarray
+    name: str  #: the foot's in the description
+    body: str  #: name of the foot body
+    body_id: int  #: its index
+    geom_ids: tuple[int, ...]  #: the collision geoms that make the sole
+    position: np.ndarray  #: (3,) reference point in the foot body's frame [m]: polygon's centroid
+    rotation: np.ndarray  #: (3, 3) columns are the sole's axes in the foot body's frame
+    polygon: np.ndarray  #: (k, 2) counter-clockwise vertices in the sole frame [m], 3 ≤ k ≤ 8
 
     def __post_init__(self) -> None:
         for array in (self.position, self.rotation, self.polygon):
@@ -48,15 +39,10 @@ class Sole:
 
 @dataclass(frozen=True)
 class SolePlane:
-    """The plane a foot rests on, in the foot body's frame.
+    """The plane a foot rests on, in the foot body's frame."""
 
-    Attributes:
-        normal: (3,) unit vector into the foot.
-        points: (n, 3) [m] points of the foot in the plane, or near and projected on it; n ≥ 3.
-    """
-
-    normal: np.ndarray
-    points: np.ndarray
+    normal: np.ndarray  #: (3,) unit vector into the foot
+    points: np.ndarray  #: (n, 3) [m] of the foot in the plane, or near and projected on it; n ≥ 3
 
 
 def sole_geoms(
@@ -87,18 +73,14 @@ def sole_geoms(
                 choices=named,
             )
     if not solid:
+        moving = model.body_weldid[body_id]
+        other = f"; it is fixed to {model.body(moving).name!r}: name that one"
+        advice = "" if moving == body_id else other
         raise ConfigError(
             f"the foot {model.body(body_id).name!r} has no collision geometry: none of its "
-            f"{len(rigid)} geoms collides with the ground (contype, conaffinity, pairs)"
-            + _fixed_to(model, body_id)
+            f"{len(rigid)} geoms collides with the ground (contype, conaffinity, pairs){advice}"
         )
     return tuple(dict.fromkeys(geom for name in names or solid for geom in named[name]))
-
-
-def _fixed_to(model: mujoco.MjModel, body: int) -> str:
-    """For the error of a body without geometry: which body it is a part of."""
-    moving = model.body_weldid[body]
-    return "" if moving == body else f"; it is fixed to {model.body(moving).name!r}: name that one"
 
 
 def find_sole_plane(

@@ -11,52 +11,33 @@ from .realism import Realism, Spread
 
 @dataclass(frozen=True, eq=False)
 class DrawnRobot:
-    """What is true of the robot of an episode; nj joints, nu motors, nb bodies.
+    """What is true of the robot of an episode; nj joints, nu motors, nb bodies."""
 
-    Attributes:
-        sense, command: physics steps by which measurements and torques are late.
-        misjudged: by which the estimator takes both together for longer [s].
-        lag, no_load_speed, backlash: of the motors [s, rad/s, rad].
-        gain: (nu,) of each motor.
-        joint_friction: (nj,) Coulomb's, over the motor's limit.
-        noise: standard deviations by the names of `SensorErrors`.
-        encoder_bias: (nj,) [rad]; gyro_bias, accelerometer_bias, tilt_bias: (3,).
-        com_shift: (3,) of the loaded body's centre of mass, in its frame [m].
-        mass_factor: (nb,) of each body's mass and inertia.
-        payload: on the loaded body, over the robot's mass.
-        friction, softness: of the ground, or None: as in the model.
-        slope: (2,) tangent of the ground's fall along x and y.
-        bumps: height of the highest bump [m].
-        arms: part of their reach within which somebody else moves the arms; 0: nobody does.
-        hand: load in a hand, over the robot's mass; `side` of it: 0 left, 1 right.
-        arms_seed: of the postures of the arms.
-    """
-
-    sense: int
-    command: int
-    misjudged: float
-    lag: float
-    gain: np.ndarray
-    joint_friction: np.ndarray
-    no_load_speed: float
-    backlash: float
-    noise: dict[str, float]
-    encoder_bias: np.ndarray
-    gyro_bias: np.ndarray
-    accelerometer_bias: np.ndarray
-    tilt_bias: np.ndarray
-    com_shift: np.ndarray
-    mass_factor: np.ndarray
-    payload: float
-    friction: float | None
-    softness: float | None
-    slope: np.ndarray
+    sense: int  #: physics steps by which measurements are late
+    command: int  #: the same of torques
+    misjudged: float  #: by which the estimator takes both together for longer [s]
+    lag: float  #: of the motors [s]
+    gain: np.ndarray  #: (nu,) of each motor
+    joint_friction: np.ndarray  #: (nj,) Coulomb's, over the motor's limit
+    no_load_speed: float  #: of the motors [rad/s]
+    backlash: float  #: of the motors [rad]
+    noise: dict[str, float]  #: standard deviations by the names of `SensorErrors`
+    encoder_bias: np.ndarray  #: (nj,) [rad]
+    gyro_bias: np.ndarray  #: (3,) [rad/s]
+    accelerometer_bias: np.ndarray  #: (3,) [m/s²]
+    tilt_bias: np.ndarray  #: (3,) [rad]
+    com_shift: np.ndarray  #: (3,) of the loaded body's centre of mass, in its frame [m]
+    mass_factor: np.ndarray  #: (nb,) of each body's mass and inertia
+    payload: float  #: on the loaded body, over the robot's mass
+    friction: float | None  #: of the ground; None: as in the model
+    softness: float | None  #: likewise
+    slope: np.ndarray  #: (2,) tangent of the ground's fall along x and y
     seed: int  #: of the noise within the episode
-    bumps: float = 0.0
-    arms: float = 0.0
-    hand: float = 0.0
-    side: int = 0
-    arms_seed: int = 0
+    bumps: float = 0.0  #: height of the highest bump [m]
+    arms: float = 0.0  #: part of their reach within which somebody else moves them; 0: nobody does
+    hand: float = 0.0  #: load in a hand, over the robot's mass
+    side: int = 0  #: of that hand: 0 left, 1 right
+    arms_seed: int = 0  #: of the postures of the arms
 
     @property
     def measured(self) -> bool:

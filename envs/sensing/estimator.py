@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 from weakref import WeakKeyDictionary
 
 import mujoco
@@ -16,11 +16,11 @@ from poise.envs.compiled.calls import Program
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1
 from poise.envs.physics.arms import allocate_arms, begin_arms, move_arms
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
+from poise.envs.physics.motor_bus import MotorBus
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot, on_terrain
@@ -29,7 +29,6 @@ from poise.envs.terrain.flat import Flat
 from .drawn import DrawnRobot
 from .external_force import (
     ExternalForce,
-    allocate_force,
     bear_load,
     begin_force,
     keep_load,
@@ -48,7 +47,6 @@ from .inekf import (
     SLIDE,
     Invariant,
     InvariantConfig,
-    allocate_invariant,
     begin_invariant,
     follow_invariant,
 )
@@ -58,12 +56,11 @@ from .measurement import (
     RING,
     Rings,
     Sensors,
-    allocate_sensors,
     arrived,
     begin_sensors,
     measure,
 )
-from .motors import allocate_motors, begin_motors, drive_motors
+from .motors import Motors, begin_motors, drive_motors
 from .odometry import (
     BB,
     JOINT_NOISE,
@@ -74,14 +71,13 @@ from .odometry import (
     VV,
     WANDER,
     Odometry,
-    allocate_odometry,
     copy_axes,
     filter_gains,
     follow_measurements,
     rate_gain,
 )
 from .plant import Plant
-from .prediction import Rollout, allocate_promises, keep_promises, make_rollout, predict, roll_out
+from .prediction import Promises, Rollout, keep_promises, predict, roll_out
 from .realism import Realism
 
 POSITIVE = {"above": 0.0}
@@ -158,11 +154,11 @@ class Belief(Block):
     rollout: Rollout
     force: ExternalForce
     friction: SlidingFriction
-    steps: np.ndarray  # (8,) int: physics steps, see SENSE and its like
-    axes: np.ndarray  # (3, 3) of the root, led on
-    q: np.ndarray  # (nj,) likewise
-    v: np.ndarray  # (nv,)
-    position: np.ndarray  # (3,)
+    steps: Annotated[np.ndarray, 8, np.int64]  # physics steps, see SENSE and its like
+    axes: Annotated[np.ndarray, 3, 3]  # of the root, led on
+    q: Annotated[np.ndarray, "nj"]  # likewise
+    v: Annotated[np.ndarray, "nv"]
+    position: Annotated[np.ndarray, 3]
 
 
 @compiled
@@ -266,26 +262,33 @@ class EstimatedState(StateSource, Copyable):
         terrain = plant.robot.terrain
         believed = on_terrain(robot, terrain if terrain.believed() else Flat())
         self.known, self.ahead = Simulation(without_contacts(believed)), Simulation(believed)
-        self.sensors: Sensors = allocate_sensors(plant.simulation)
+        true, sizes = self.simulation, self.simulation.sizes
+        world = {"robot": true.arrays, "views": true.views, "bus": MotorBus.allocate(sizes)}
+        rings = Rings.allocate(sizes)
+        self.sensors = Sensors.allocate(sizes, **world, rings=rings)
         self.bus = self.sensors.bus
-        self.motors = allocate_motors(plant.simulation, self.bus)
+        self.motors = Motors.allocate(sizes, **world)
         self.arms = allocate_arms(plant.simulation, self.known)
         self.known.state_arrays = replace(
             self.known.state_arrays, motor_q=self.bus.q, motor_dq=self.bus.dq
         )
         self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays
-        promises = allocate_promises(RING, plant.simulation.model.nv)
+        promises = Promises.allocate({"n": RING, **sizes})
         self.promise = promises.last
-        rings = self.sensors.rings
-        self.odometry = allocate_odometry(self.arrays, self.state_arrays, rings, promises)
-        self.invariant = allocate_invariant(self.odometry)
-        nv, zeros = plant.simulation.model.nv, guarded_zeros
-        self.belief = Belief(
-            rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
-            make_rollout(self.ahead, self.motors), allocate_force(),
-            allocate_friction(robot),
-            zeros(8, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
-        )  # fmt: skip
+        own = {"robot": self.arrays, "state": self.state_arrays, "rings": rings}
+        self.odometry = Odometry.allocate(sizes, **own, promises=promises)
+        errors = {"n": 15 + 3 * sizes["nc"], **sizes}
+        self.invariant = Invariant.allocate(errors, odometry=self.odometry)
+        self.belief = Belief.allocate(
+            sizes,
+            **own,
+            odometry=self.odometry,
+            invariant=self.invariant,
+            views=self.known.views,
+            rollout=Rollout(self.ahead.arrays, self.ahead.views, self.motors),
+            force=ExternalForce.allocate(),
+            friction=allocate_friction(robot),
+        )
         self.drive = Program.of([(drive_motors, self.motors), (move_arms, self.arms)])
         self.sense = Program.of([(measure, self.sensors)])
         self.estimate = Program.of([(believe, self.belief)])

@@ -12,13 +12,13 @@ lasts for longer is a load: the robot is heavier than it is known to be, or else
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -38,24 +38,15 @@ ARM = 0.2  # [h] at which such a part of the weight makes a moment
 class ExternalForce(Block):
     """The wrench that nothing explains: force [N] and moment about the CoM [N·m], world axes."""
 
-    wrench: np.ndarray  # (6,) that is believed
-    smooth: np.ndarray  # (6,) low-passed
-    noise: np.ndarray  # (2,) mean squares of its force and of its moment
-    momentum: np.ndarray  # (6,) at the physics step `seen`
-    mean: np.ndarray  # (3,) f_z, n_x, n_y over `QUICK`
-    load: np.ndarray  # (3,) what of them lasts
-    time: np.ndarray  # (1,) in which that is learned [s]
-    seen: np.ndarray  # (1,) int; -1 before the first one
-    ticks: np.ndarray  # (1,) int: wrenches until now
-
-
-def allocate_force() -> ExternalForce:
-    """No force."""
-    zeros, count = guarded_zeros, np.int64
-    return ExternalForce(
-        zeros(6), zeros(6), zeros(2), zeros(6), zeros(3), zeros(3), zeros(1), zeros(1, count),
-        zeros(1, count),
-    )  # fmt: skip
+    wrench: Annotated[np.ndarray, 6]  # that is believed
+    smooth: Annotated[np.ndarray, 6]  # low-passed
+    noise: Annotated[np.ndarray, 2]  # mean squares of its force and of its moment
+    momentum: Annotated[np.ndarray, 6]  # at the physics step `seen`
+    mean: Annotated[np.ndarray, 3]  # f_z, n_x, n_y over `QUICK`
+    load: Annotated[np.ndarray, 3]  # what of them lasts
+    time: Annotated[np.ndarray, 1]  # in which that is learned [s]
+    seen: Annotated[np.ndarray, 1, np.int64]  # -1 before the first one
+    ticks: Annotated[np.ndarray, 1, np.int64]  # wrenches until now
 
 
 def begin_force(e: ExternalForce, load_time: float) -> None:

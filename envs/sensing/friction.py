@@ -7,12 +7,12 @@ along and across is the friction [Caron15]. Before it slides nobody knows more t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.ground import contact_friction
@@ -31,16 +31,16 @@ class SlidingFriction(Block):
     """What soles have told while they slid."""
 
     known: float  # friction of the model
-    speed: np.ndarray  # (1,) from which a sole is taken to slide [m/s]; 0: never
-    last: np.ndarray  # (1,) ratio of the tick before, if soles slid in it, else 0
-    told: np.ndarray  # (1,) int: 1 once soles have told something
+    speed: Annotated[np.ndarray, 1]  # from which a sole is taken to slide [m/s]; 0: never
+    last: Annotated[np.ndarray, 1]  # ratio of the tick before, if soles slid in it, else 0
+    told: Annotated[np.ndarray, 1, np.int64]  # 1 once soles have told something
 
 
 def allocate_friction(robot: Robot) -> SlidingFriction:
     """The friction of a robot's soles on its ground."""
     geoms = [geom for sole in robot.soles for geom in sole.geom_ids]
     known = contact_friction(robot.model, robot.ground_geom_id, geoms)
-    return SlidingFriction(known, guarded_zeros(1), guarded_zeros(1), guarded_zeros(1, np.int64))
+    return SlidingFriction.allocate(known=known)
 
 
 def begin_friction(f: SlidingFriction, s: StateArrays, speed: float) -> None:

@@ -13,13 +13,13 @@ linear equation exactly, wherever the state is [Barrau17].
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
-from poise.envs.compiled.memory import guarded_zeros
 
 from .odometry import LOAD, Odometry, copy_axes, keep_joints, place_pressure
 from .prediction import turn_axes
@@ -58,30 +58,19 @@ class Invariant(Block):
     """The filter of a robot with nc soles; n = 15 + 3 nc errors."""
 
     odometry: Odometry  # whose joints, axes, position and velocity are filled
-    place: np.ndarray  # (2 + nc, 3) v [m/s], p, d₁ … [m]
-    gyro_bias: np.ndarray  # (3,) root axes [rad/s]
-    force_bias: np.ndarray  # (3,) root axes [m/s²]
-    P: np.ndarray  # (n, n)
-    before: np.ndarray  # (3, 3) R before a step; then the mean of both
-    noise: np.ndarray  # (3, 3) covariance of a measurement
-    z: np.ndarray  # (3,) what is measured over what is expected
-    B: np.ndarray  # (3, n) H P; in a step the gyro's columns Gᵀ
-    K: np.ndarray  # (3, n) Kᵀ; in a step ε of each column of P
-    error: np.ndarray  # (n,) ξ̂, ζ̂
-    seen: np.ndarray  # (3,) a sole from the root, root axes [m]
-    quaternion: np.ndarray  # (4,)
-    numbers: np.ndarray  # (10,) see GYRO and its like
-
-
-def allocate_invariant(odometry: Odometry) -> Invariant:
-    """A filter that has seen nothing."""
-    zeros, nc = guarded_zeros, len(odometry.state.contacts)
-    n = 15 + 3 * nc
-    return Invariant(
-        odometry, zeros((2 + nc, 3)), zeros(3), zeros(3), zeros((n, n)), zeros((3, 3)),
-        zeros((3, 3)), zeros(3), zeros((3, n)), zeros((3, n)), zeros(n), zeros(3), zeros(4),
-        zeros(10),
-    )  # fmt: skip
+    place: Annotated[np.ndarray, "nc+2", 3]  # v [m/s], p, d₁ … [m]
+    gyro_bias: Annotated[np.ndarray, 3]  # root axes [rad/s]
+    force_bias: Annotated[np.ndarray, 3]  # root axes [m/s²]
+    P: Annotated[np.ndarray, "n", "n"]
+    before: Annotated[np.ndarray, 3, 3]  # R before a step; then the mean of both
+    noise: Annotated[np.ndarray, 3, 3]  # covariance of a measurement
+    z: Annotated[np.ndarray, 3]  # what is measured over what is expected
+    B: Annotated[np.ndarray, 3, "n"]  # H P; in a step the gyro's columns Gᵀ
+    K: Annotated[np.ndarray, 3, "n"]  # Kᵀ; in a step ε of each column of P
+    error: Annotated[np.ndarray, "n"]  # ξ̂, ζ̂
+    seen: Annotated[np.ndarray, 3]  # a sole from the root, root axes [m]
+    quaternion: Annotated[np.ndarray, 4]
+    numbers: Annotated[np.ndarray, 10]  # see GYRO and its like
 
 
 @compiled

@@ -8,6 +8,7 @@ is in the root's frame or without one: no sensor tells where the root is, nor ho
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import mujoco
 import numpy as np
@@ -16,10 +17,8 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.noise import add_noise, normal
 from poise.envs.compiled.maths.vectors import copy_into
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, SimViews
-from poise.envs.physics.motor_bus import MotorBus, motor_bus
-from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.motor_bus import MotorBus
 
 from .drawn import DrawnRobot
 
@@ -35,17 +34,17 @@ class Rings(Block):
     `truth_qpos`, `truth_qvel` are what no sensor gives: only the estimator `exact` reads them.
     """
 
-    next: np.ndarray  # (1,) int: the row of the next measurement
-    count: np.ndarray  # (1,) int: measurements since the reset
-    attitude: np.ndarray  # (RING, 3, 3) axes of the IMU in a frame whose z is up
-    gyro: np.ndarray  # (RING, 3) angular velocity, root axes [rad/s]
-    force: np.ndarray  # (RING, 3) specific force Rᵀ(a − g), root axes [m/s²]
-    q: np.ndarray  # (RING, nj) [rad]
-    dq: np.ndarray  # (RING, nj) [rad/s]
-    wrench: np.ndarray  # (RING, 6) of the ground: force, and moment about the root; root axes
-    found: np.ndarray  # (RING, nc + 1) contacts with the ground: of each foot, of anything
-    truth_qpos: np.ndarray  # (RING, nq)
-    truth_qvel: np.ndarray  # (RING, nv)
+    next: Annotated[np.ndarray, 1, np.int64]  # the row of the next measurement
+    count: Annotated[np.ndarray, 1, np.int64]  # measurements since the reset
+    attitude: Annotated[np.ndarray, RING, 3, 3]  # axes of the IMU in a frame whose z is up
+    gyro: Annotated[np.ndarray, RING, 3]  # angular velocity, root axes [rad/s]
+    force: Annotated[np.ndarray, RING, 3]  # specific force Rᵀ(a − g), root axes [m/s²]
+    q: Annotated[np.ndarray, RING, "nj"]  # [rad]
+    dq: Annotated[np.ndarray, RING, "nj"]  # [rad/s]
+    wrench: Annotated[np.ndarray, RING, 6]  # of the ground, about the root: force, moment; its axes
+    found: Annotated[np.ndarray, RING, "nc+1"]  # ground contacts: of each foot, of anything
+    truth_qpos: Annotated[np.ndarray, RING, "nq"]
+    truth_qvel: Annotated[np.ndarray, RING, "nv"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,18 +54,18 @@ class Sensors(Block):
     robot: RobotArrays
     views: SimViews
     rings: Rings
-    seed: np.ndarray  # (1,) uint64, see `uniform`
-    noise: np.ndarray  # (8,) deviations; play of the joints [rad]
-    encoder_bias: np.ndarray  # (nj,)
-    gyro_bias: np.ndarray  # (3,)
-    force_bias: np.ndarray  # (3,) of the accelerometer
-    mount: np.ndarray  # (3, 3) axes of the IMU in the root's frame
-    level: np.ndarray  # (3, 3) from the simulation's axes to those whose z is up
-    gravity: np.ndarray  # (3,) in the simulation's axes [m/s²]
-    drift: np.ndarray  # (3,) rotation vector of the attitude's error now [rad]
-    play: np.ndarray  # (nj,) motor's position over the joint's, within the backlash [rad]
-    last_q: np.ndarray  # (nj,) joint positions at the last measurement
-    last_velocity: np.ndarray  # (3,) of the root, at the last measurement
+    seed: Annotated[np.ndarray, 1, np.uint64]  # see `uniform`
+    noise: Annotated[np.ndarray, 8]  # deviations; play of the joints [rad]
+    encoder_bias: Annotated[np.ndarray, "nj"]
+    gyro_bias: Annotated[np.ndarray, 3]
+    force_bias: Annotated[np.ndarray, 3]  # of the accelerometer
+    mount: Annotated[np.ndarray, 3, 3]  # axes of the IMU in the root's frame
+    level: Annotated[np.ndarray, 3, 3]  # from the simulation's axes to those whose z is up
+    gravity: Annotated[np.ndarray, 3]  # in the simulation's axes [m/s²]
+    drift: Annotated[np.ndarray, 3]  # rotation vector of the attitude's error now [rad]
+    play: Annotated[np.ndarray, "nj"]  # motor's position over the joint's, within backlash [rad]
+    last_q: Annotated[np.ndarray, "nj"]  # joint positions at the last measurement
+    last_velocity: Annotated[np.ndarray, 3]  # of the root, at the last measurement
     bus: MotorBus  # has what the encoders read now: motors have it at once
 
 
@@ -75,48 +74,6 @@ def arrived(r: Rings, late: int) -> int:
     """The row of the newest measurement that is known, `late` physics steps after it was taken."""
     n = r.q.shape[0]
     return (r.next[0] - 1 - min(late, n - 1) + n) % n
-
-
-def allocate_rings(simulation: Simulation) -> Rings:
-    """Measurements, none yet."""
-    nv, nc = simulation.model.nv, len(simulation.robot.soles)
-    zeros, nj = guarded_zeros, simulation.model.nv - 6
-    return Rings(
-        next=zeros(1, np.int64),
-        count=zeros(1, np.int64),
-        attitude=zeros((RING, 3, 3)),
-        gyro=zeros((RING, 3)),
-        force=zeros((RING, 3)),
-        q=zeros((RING, nj)),
-        dq=zeros((RING, nj)),
-        wrench=zeros((RING, 6)),
-        found=zeros((RING, nc + 1)),
-        truth_qpos=zeros((RING, nv + 1)),
-        truth_qvel=zeros((RING, nv)),
-    )
-
-
-def allocate_sensors(simulation: Simulation) -> Sensors:
-    """Sensors that have measured nothing."""
-    zeros, nj = guarded_zeros, simulation.model.nv - 6
-    return Sensors(
-        robot=simulation.arrays,
-        views=simulation.views,
-        rings=allocate_rings(simulation),
-        seed=zeros(1, np.uint64),
-        noise=zeros(8),
-        encoder_bias=zeros(nj),
-        gyro_bias=zeros(3),
-        force_bias=zeros(3),
-        mount=zeros((3, 3)),
-        level=zeros((3, 3)),
-        gravity=zeros(3),
-        drift=zeros(3),
-        play=zeros(nj),
-        last_q=zeros(nj),
-        last_velocity=zeros(3),
-        bus=motor_bus(nj, simulation.model.nu),
-    )
 
 
 def begin_sensors(s: Sensors, drawn: DrawnRobot, model: mujoco.MjModel) -> None:

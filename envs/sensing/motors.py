@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.motor_bus import MotorBus
-from poise.envs.physics.simulation import Simulation
 
 from .drawn import DrawnRobot
 
@@ -27,28 +26,14 @@ class Motors(Block):
     robot: RobotArrays
     views: SimViews
     bus: MotorBus
-    asked: np.ndarray  # (RING, 4, nu) what was asked for: torque, target, stiffness, damping
-    written: np.ndarray  # (1,) int: rows that were written since the reset; the next one follows
-    late: np.ndarray  # (1,) int: physics steps
-    torque: np.ndarray  # (nu,) that act [N·m]
-    gain: np.ndarray  # (nu,)
-    numbers: np.ndarray  # (2,) 1 − exp(−dt/lag); the no-load speed [rad/s], 0: none
-
-
-def allocate_motors(simulation: Simulation, bus: MotorBus) -> Motors:
-    """Motors that have been asked for nothing."""
-    nu = simulation.model.nu
-    return Motors(
-        robot=simulation.arrays,
-        views=simulation.views,
-        bus=bus,
-        asked=guarded_zeros((RING, 4, nu)),
-        written=guarded_zeros(1, dtype=np.int64),
-        late=guarded_zeros(1, dtype=np.int64),
-        torque=guarded_zeros(nu),
-        gain=guarded_zeros(nu),
-        numbers=guarded_zeros(2),
-    )
+    asked: Annotated[np.ndarray, RING, 4, "nu"]  # asked for: torque, target, stiffness, damping
+    written: Annotated[
+        np.ndarray, 1, np.int64
+    ]  # rows written since the reset; the next one follows
+    late: Annotated[np.ndarray, 1, np.int64]  # physics steps
+    torque: Annotated[np.ndarray, "nu"]  # that act [N·m]
+    gain: Annotated[np.ndarray, "nu"]
+    numbers: Annotated[np.ndarray, 2]  # 1 − exp(−dt/lag); the no-load speed [rad/s], 0: none
 
 
 def begin_motors(m: Motors, drawn: DrawnRobot, holding: np.ndarray) -> None:

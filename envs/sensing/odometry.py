@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -11,7 +12,6 @@ from scipy.linalg import solve_discrete_are
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -33,29 +33,17 @@ class Odometry(Block):
     state: StateArrays  # the state believed in the tick before: its Jacobians serve here
     rings: Rings
     promises: Promises
-    seen: np.ndarray  # (1,) int: measurements that have been used
-    position: np.ndarray  # (3,) of the root [m]
-    axes: np.ndarray  # (3, 3) of the root
-    q: np.ndarray  # (nj,) [rad]
-    v: np.ndarray  # (nv,) velocity: of the root in world axes, its angular one, the joints'
-    bias: np.ndarray  # (3,) of the accelerometer and the attitude, world axes [m/s²]
-    variance: np.ndarray  # (3,) of each component of the root's velocity, with the bias, of that
-    pressed: np.ndarray  # (nc, 3) of each sole: where it is pressed [m], its part of the load
-    told: np.ndarray  # (6,) how a sole moves against a resting root [m/s, rad/s]
-    gains: np.ndarray  # (2, 2) rows q, q̇: corrections by errors of q and q̇
-    numbers: np.ndarray  # (6,) see STIR and its like
-
-
-def allocate_odometry(
-    robot: RobotArrays, state: StateArrays, rings: Rings, promises: Promises
-) -> Odometry:
-    """An estimator that has seen nothing."""
-    zeros, nv = guarded_zeros, len(state.qvel)
-    return Odometry(
-        robot, state, rings, promises, zeros(1, np.int64), zeros(3), zeros((3, 3)), zeros(nv - 6),
-        zeros(nv), zeros(3), zeros(3), zeros((len(state.contacts), 3)), zeros(6), zeros((2, 2)),
-        zeros(6),
-    )  # fmt: skip
+    seen: Annotated[np.ndarray, 1, np.int64]  # measurements that have been used
+    position: Annotated[np.ndarray, 3]  # of the root [m]
+    axes: Annotated[np.ndarray, 3, 3]  # of the root
+    q: Annotated[np.ndarray, "nj"]  # [rad]
+    v: Annotated[np.ndarray, "nv"]  # velocity: root's in world axes, its angular one, joints'
+    bias: Annotated[np.ndarray, 3]  # of the accelerometer and the attitude, world axes [m/s²]
+    variance: Annotated[np.ndarray, 3]  # of a component of the root's v, with the bias, of that
+    pressed: Annotated[np.ndarray, "nc", 3]  # of each sole: where pressed [m], its part of the load
+    told: Annotated[np.ndarray, 6]  # how a sole moves against a resting root [m/s, rad/s]
+    gains: Annotated[np.ndarray, 2, 2]  # rows q, q̇: corrections by errors of q and q̇
+    numbers: Annotated[np.ndarray, 6]  # see STIR and its like
 
 
 @lru_cache(maxsize=256)  # a Riccati equation at each reset would take most of it

@@ -7,16 +7,15 @@ known already, and the QP has promised the accelerations that they bring.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
 from poise.envs.physics.arrays import RobotArrays, SimViews
-from poise.envs.physics.simulation import Simulation
 
 from .motors import DAMPING, STIFFNESS, TARGET, TORQUE, Motors
 
@@ -25,14 +24,9 @@ from .motors import DAMPING, STIFFNESS, TARGET, TORQUE, Motors
 class Promises(Block):
     """Accelerations that the controller has promised, one row for each physics step."""
 
-    last: np.ndarray  # (nv,) of the running tick; zero where the controller promises none
-    rows: np.ndarray  # (n, nv) by the number of the physics step in which they were asked for
-    written: np.ndarray  # (1,) int: physics steps whose rows are written
-
-
-def allocate_promises(rows: int, nv: int) -> Promises:
-    """No promises yet."""
-    return Promises(guarded_zeros(nv), guarded_zeros((rows, nv)), guarded_zeros(1, np.int64))
+    last: Annotated[np.ndarray, "nv"]  # of the running tick; zero where nobody promises any
+    rows: Annotated[np.ndarray, "n", "nv"]  # by the number of the physics step that asked for them
+    written: Annotated[np.ndarray, 1, np.int64]  # physics steps whose rows are written
 
 
 @compiled
@@ -98,11 +92,6 @@ class Rollout(Block):
     robot: RobotArrays
     views: SimViews
     motors: Motors  # what they were asked for, which the computer knows
-
-
-def make_rollout(simulation: Simulation, motors: Motors) -> Rollout:
-    """The rollout in a simulation of its own, of the known robot."""
-    return Rollout(simulation.arrays, simulation.views, motors)
 
 
 @compiled

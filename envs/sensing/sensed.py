@@ -18,19 +18,12 @@ from .realism import Realism, overlaid
 
 
 class SensedRobot:
-    """The base of what has a simulation, a level of realism and a `StateSource`.
+    """The base of what has a simulation, a level of realism and a `StateSource`."""
 
-    Attributes:
-        robot: the robot that is known; the simulated one may differ, see `Realism`.
-        estimator: how the state is estimated where it is not known exactly.
-        drawn: the robot of the running episode; None where it is the one that is known.
-        drawn_told: what `info` tells of it.
-    """
-
-    robot: Robot
-    estimator: EstimatorConfig
-    drawn: DrawnRobot | None
-    drawn_told: dict[str, Any]
+    robot: Robot  #: that is known; the simulated one may differ, see `Realism`
+    estimator: EstimatorConfig  #: how the state is estimated where it is not known exactly
+    drawn: DrawnRobot | None  #: of the running episode; None where it is the one that is known
+    drawn_told: dict[str, Any]  #: what `info` tells of it
     _simulation: Simulation
     _state_source: StateSource
     _raw = False  # whether the controller brings an estimator of its own

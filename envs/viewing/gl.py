@@ -17,7 +17,8 @@ def choose_gl_backend() -> str | None:
     os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
     load_osmesa_alone()
     chosen = os.environ.get("MUJOCO_GL")
-    if chosen or not sys.platform.startswith("linux") or "mujoco" in sys.modules or _has_display():
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if chosen or not sys.platform.startswith("linux") or "mujoco" in sys.modules or display:
         return chosen
     for backend, library in (("osmesa", "OSMesa"), ("egl", "EGL")):
         if ctypes.util.find_library(library):
@@ -45,7 +46,3 @@ def load_osmesa_alone() -> None:
         pass  # MuJoCo tells what is missing
     finally:
         names["RTLD_GLOBAL"] = shown
-
-
-def _has_display() -> bool:
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -19,7 +19,7 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot, fingerprint, load_robot
-from poise.envs.sensing.external_force import allocate_force, bear_load
+from poise.envs.sensing.external_force import ExternalForce, bear_load
 
 robot_named = functools.cache(load_robot)
 
@@ -121,7 +121,7 @@ def recovery(
     qp = controller(robot, root=root)
     simulation = Simulation(robot)
     simulation.state_arrays.friction[0] = friction
-    ticks, force = [], allocate_force()
+    ticks, force = [], ExternalForce.allocate()
     force.load[:] = load
     for direction in (0.0, 90.0, 180.0, 250.0):
         state = simulation.reset(pushes=[push(robot, specific, direction)])

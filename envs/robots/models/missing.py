@@ -2,7 +2,6 @@
 
 import re
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,18 +31,19 @@ def drop_missing(spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...]) -> None
     """
     if unopened(spec) is None:
         return
-    lost = {(type(asset), i): name for asset, i, name in _missing(spec)}
-    missing = {
-        kind: {each.name: lost[type(each), i] for i, each in enumerate(assets)
-               if (type(each), i) in lost}
-        for kind, assets in _assets(spec).items()
-    }  # fmt: skip
+    missing: dict[str, dict[str, str]] = {}
+    files: list[str] = []
+    for kind, assets in _assets(spec).items():
+        missing[kind] = {}
+        for i, asset in enumerate(assets):  # each is tried alone
+            if _files(asset) and (file := unopened(_alone(spec, kind, i))) is not None:
+                missing[kind][asset.name] = file
+                files += [] if file in files else [file]
     bodies = _drop_meshes(spec, missing["mesh"], feet)
     _drop_textures(spec, set(missing["texture"]))
     _drop_height_fields(spec, set(missing["hfield"]))
     for skin in [skin for skin in spec.skins if skin.name in missing["skin"]]:
         spec.delete(skin)
-    files = list(dict.fromkeys(lost.values()))
     warnings.warn(
         f"{path}: {len(files)} files are missing ({', '.join(files[:3])}"
         f"{', …' if len(files) > 3 else ''}), and what is drawn with them; these bodies lose "
@@ -67,14 +67,6 @@ def unopened(spec: mujoco.MjSpec) -> str | None:
 def _assets(spec: mujoco.MjSpec) -> dict[str, list[Asset]]:
     return {"mesh": list(spec.meshes), "texture": list(spec.textures),
             "hfield": list(spec.hfields), "skin": list(spec.skins)}  # fmt: skip
-
-
-def _missing(spec: mujoco.MjSpec) -> Iterator[tuple[Asset, int, str]]:
-    """(asset, number among its kind, file) of what MuJoCo cannot open, each tried alone."""
-    for kind, assets in _assets(spec).items():
-        for i, asset in enumerate(assets):
-            if _files(asset) and (file := unopened(_alone(spec, kind, i))) is not None:
-                yield asset, i, file
 
 
 def _alone(spec: mujoco.MjSpec, kind: str, number: int) -> mujoco.MjSpec:

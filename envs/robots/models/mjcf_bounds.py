@@ -72,7 +72,9 @@ class MjcfText:
         for closing, name, attributes, empty in tags(text):
             if not closing:
                 self._count(name, attributes, factors, depth, path.parent)
-                self._note_files(attributes)
+                named = (value for key, value in attributes.items() if key.startswith("file"))
+                self._names.update(named)
+                self._within.update(attributes[key] for key in DIRS if key in attributes)
                 if name == "replicate" and not empty:
                     factors.append(factors[-1] * _whole(attributes.get("count", "1")))
             elif name == "replicate":
@@ -103,11 +105,6 @@ class MjcfText:
                     self._walk(file, factor, depth + 1)
                     break
             self._models += self._elements - before if name == "model" else 0
-
-    def _note_files(self, attributes: dict[str, str]) -> None:
-        """Remember what an element names as a file, and as a folder of such."""
-        self._names.update(value for key, value in attributes.items() if key.startswith("file"))
-        self._within.update(attributes[key] for key in DIRS if key in attributes)
 
     def _check_regular(self) -> None:
         """Raise ConfigError where a name may be that of what is no regular file."""

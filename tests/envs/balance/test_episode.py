@@ -7,8 +7,8 @@ import pytest
 from poise.envs.balance import episode
 from poise.envs.balance.episode import (
     METRICS,
+    EpisodeArrays,
     Judge,
-    allocate_episode,
     begin_episode,
     judge_step,
     record_tick,
@@ -22,7 +22,8 @@ from tests.support.shared import generic_state, robot
 
 def new_episode(actions, nc=2):
     """An empty record."""
-    return allocate_episode(actions, 1, len(REWARD_TERMS), nc, robot().model.nu)
+    sizes = {"na": actions, "no": 1, "terms": len(REWARD_TERMS), "nc": nc}
+    return EpisodeArrays.allocate(sizes | {"nu": robot().model.nu})
 
 
 def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, actions=3, e=None,

@@ -12,7 +12,7 @@ from poise.baselines.registry import load_controller
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.sensing.estimator import EstimatedState
-from poise.envs.sensing.external_force import allocate_force, bear_load
+from poise.envs.sensing.external_force import ExternalForce, bear_load
 from tests.support.sensing import estimated, start
 from tests.support.shared import robot
 
@@ -154,7 +154,7 @@ def test_a_load_is_a_heavier_root():
     s, arrays = light.state, light.state_arrays
     g = robot().units.gravity
     place = s.qpos[:3] + s.root_axes @ at - s.com
-    force = allocate_force()
+    force = ExternalForce.allocate()
     force.load[:] = -added * g, -added * g * place[1], added * g * place[0]
     bear_load(force, light.arrays, arrays)
     np.testing.assert_allclose(s.h[:6], heavy.state.h[:6], atol=1e-9)
@@ -168,7 +168,7 @@ def test_moments_move_with_their_point():
     simulation = Simulation(robot())
     simulation.reset(None, np.random.default_rng(5).standard_normal(robot().model.nv))
     before = simulation.state.copy()
-    force = allocate_force()
+    force = ExternalForce.allocate()
     force.load[:] = -30.0, 4.0, -6.0
     bear_load(force, simulation.arrays, simulation.state_arrays)
     after = simulation.state

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.envs.sensing.estimator import EstimatedState
-from poise.envs.sensing.prediction import allocate_promises, keep_promises, predict, turn_axes
+from poise.envs.sensing.prediction import Promises, keep_promises, predict, turn_axes
 from tests.support.physics import random_state
 from tests.support.sensing import estimated, start
 from tests.support.shared import robot
@@ -29,7 +29,7 @@ def test_axes_turn_about_themselves(angle):
 def test_a_prediction_is_mujocos_integration():
     """Of the promised rows, as late as `earlier` says; none before the first and after the last."""
     model, rng = robot().model, np.random.default_rng(2)
-    promises, dt, earlier = allocate_promises(16, model.nv), 0.002, 3
+    promises, dt, earlier = Promises.allocate({"n": 16, "nv": model.nv}), 0.002, 3
     rows = rng.normal(0.0, 20.0, (20, model.nv))
     for now, row in enumerate(rows, 1):
         promises.last[:] = row
@@ -52,7 +52,7 @@ def test_a_prediction_is_mujocos_integration():
 
 def test_steps_before_the_first_promise_have_none():
     """A row counts once it is written; what was written is not changed by the next promise."""
-    promises = allocate_promises(8, robot().model.nv)
+    promises = Promises.allocate({"n": 8, "nv": robot().model.nv})
     keep_promises(promises, 0)
     assert promises.written[0] == 0
     promises.last[:] = 1.0
