@@ -17,6 +17,8 @@ from .mdp.reward import RewardWeights
 from .mdp.termination import FallLimits
 from .start import StartNoise as StartNoise
 
+OMIT = {"omit": "default"}  # from files, while a field has its default
+
 
 class UnknownArgument(ConfigError, TypeError):
     """An argument that the environment does not have. A TypeError too, as of any function.
@@ -41,7 +43,7 @@ class ObservationConfig:
     terms: tuple[str, ...] | None = None
     extra: tuple[str, ...] = ()
     history: int = field(default=1, metadata={"min": 1, "max": 100, "omit": "default"})
-    privileged: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
+    privileged: tuple[str, ...] = field(default=(), metadata=OMIT)
 
 
 @dataclass(frozen=True)
@@ -73,15 +75,11 @@ class EnvConfig:
     noise: StartNoise = field(default_factory=StartNoise)
     fall: FallLimits = field(default_factory=FallLimits)
     reward: RewardWeights = field(default_factory=RewardWeights)
-    observation: ObservationConfig = field(
-        default_factory=ObservationConfig, metadata={"omit": "default"}
-    )
-    realism: Realism = field(default_factory=Realism, metadata={"omit": "default"})
-    estimator: EstimatorConfig = field(
-        default_factory=EstimatorConfig, metadata={"omit": "default"}
-    )
-    terrain: Terrain = field(default_factory=Flat, metadata={"omit": "default"})
-    clip_action: bool = field(default=False, metadata={"omit": "default"})
+    observation: ObservationConfig = field(default_factory=ObservationConfig, metadata=OMIT)
+    realism: Realism = field(default_factory=Realism, metadata=OMIT)
+    estimator: EstimatorConfig = field(default_factory=EstimatorConfig, metadata=OMIT)
+    terrain: Terrain = field(default_factory=Flat, metadata=OMIT)
+    clip_action: bool = field(default=False, metadata=OMIT)
 
 
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: object) -> EnvConfig:

@@ -101,6 +101,7 @@ class Patience(event.Listener):
             self.tell()
 
     def tell(self) -> None:
+        """The message, once in a process."""
         if not self.announced:
             self.announced = True
             print(MESSAGE, file=sys.stderr, flush=True)
@@ -109,15 +110,5 @@ class Patience(event.Listener):
         self.depth -= 1
 
 
-_patience = Patience()
-event.register("numba:compile", _patience)
-
-
-def tell() -> None:
-    """The message, once in a process."""
-    _patience.tell()
-
-
-def quiet() -> None:
-    """No message from this process: the one that started it has announced it."""
-    _patience.announced = True
+patience = Patience()
+event.register("numba:compile", patience)

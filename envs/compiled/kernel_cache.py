@@ -35,7 +35,9 @@ def compiled_once(dispatcher: Any, folder: Path) -> Any:
 
     One process at a time compiles a function; the others wait and read it.
     """
-    lock, compile_ = folder / f"{_name(dispatcher.py_func)}.lock", dispatcher.compile
+    name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__qualname__}"
+    lock = folder / f"{hashlib.sha256(name.encode()).hexdigest()}.lock"
+    compile_ = dispatcher.compile
 
     def compile_alone(signature: Any) -> Any:
         with global_compiler_lock, _held(lock), _own_copies():  # threads agree on this order
@@ -82,10 +84,6 @@ def _linkable(module: Any) -> Any:
     for function in _defined(copy, Linkage.external):
         function.linkage = "linkonce_odr"
     return copy
-
-
-def _name(function: Any) -> str:
-    return hashlib.sha256(f"{function.__module__}.{function.__qualname__}".encode()).hexdigest()
 
 
 _locks: set[Path] = set()  # that this process holds: a kernel may call itself

@@ -36,7 +36,7 @@ def fill_cache(module: str, *groups: Sequence[str]) -> None:
         if not missing:
             continue
         _tried.update(missing)
-        jit.tell()
+        jit.patience.tell()
         if not _compile_apart(module, missing):
             return
 
@@ -97,19 +97,14 @@ def _compile_apart(module: str, parts: Sequence[str]) -> bool:
 
 def compile_here(module: ModuleType, parts: Sequence[str]) -> None:
     """This process compiles these parts, one after the other, and ends soon after."""
-    begin()
+    global _compiling
+    _compiling = True
+    jit.patience.announced = True  # the process that started this one has told the user
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)  # looking for garbage of Numba's takes a tenth of the time
     for part in parts:
         getattr(module, part)()
         end(module.__name__, part)
-
-
-def begin() -> None:
-    """This process compiles: it has nothing to wait for, and its starter has told the user."""
-    global _compiling
-    _compiling = True
-    jit.quiet()
 
 
 def end(module: str, part: str) -> None:

@@ -6,7 +6,6 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.easing import eased
@@ -48,14 +47,6 @@ def find_arms(robot: Robot) -> tuple[Arm, ...]:
         deep = max(joints, key=lambda joint: len(lines[joint]))
         arms.append(Arm(tuple(j - 1 for j in joints), int(model.jnt_bodyid[deep])))
     return tuple(arms)
-
-
-def check_arms(robot: Robot, source: str, field: str) -> None:
-    """Raise ConfigError for a robot of which no arms are known, where `field` needs some."""
-    if not find_arms(robot):
-        raise ConfigError(f"the robot {robot.name} has no arms: its description has not the roles "
-                          f"{' and '.join(ROLES)}", source=source, field=field,
-                          choices=robot.description.roles or ("no roles",))  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
-import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
@@ -14,6 +13,7 @@ from poise.envs.robots.robot import Robot
 from .arrays import dof_chain
 from .jacobian import point_jacobian
 from .kinematics import StateArrays
+from .legs import standing_data
 from .state import RobotState
 
 
@@ -98,8 +98,6 @@ def _at(spatial: np.ndarray, r: np.ndarray) -> np.ndarray:
 
 def standing_frame(robot: Robot, point: BodyPoint) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) [m] of the point and axes (3, 3) of its body in the standing posture."""
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(robot.model, data)
+    data = standing_data(robot)
     axes = data.xmat[point.body].reshape(3, 3).copy()
     return data.xpos[point.body] + axes @ point.offset, axes

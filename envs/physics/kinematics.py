@@ -17,9 +17,9 @@ from poise.envs.compiled.maths.pendulum import compiled_rate
 from poise.envs.compiled.maths.polygons import convex_hull
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import GAP, guarded_zeros
+from poise.envs.robots.ground import SLOTS
 from poise.envs.robots.soles import MAX_VERTICES
 from poise.envs.terrain.arrays import ground_height, surface_below, surface_height
-from poise.envs.terrain.building import SLOTS
 
 from .arrays import RobotArrays, SimViews
 from .jacobian import point_jacobian

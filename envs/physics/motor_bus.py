@@ -18,18 +18,16 @@ class MotorBus(Block):
 
     q: Annotated[np.ndarray, "nj"]  # joint positions that the motors read now [rad]
     dq: Annotated[np.ndarray, "nj"]  # joint velocities likewise [rad/s]
-    servoed: Annotated[
-        np.ndarray, 1, np.int64
-    ]  # 1 where the motors are asked for what follows, once
+    servoed: Annotated[np.ndarray, 1, np.int64]  # 1 where motors are asked for what follows
     torque: Annotated[np.ndarray, "nu"]  # u [N·m] of τ = u + K (q* − q) − D q̇
     target: Annotated[np.ndarray, "nu"]  # q* [rad]
     stiffness: Annotated[np.ndarray, "nu"]  # K [N·m/rad]
     damping: Annotated[np.ndarray, "nu"]  # D [N·m·s/rad]
 
 
-def motor_bus(nj: int = 0, nu: int = 0) -> MotorBus:
-    """The bus of a robot of `nj` joints and `nu` motors; of none where motors are ideal."""
-    return MotorBus.allocate({"nj": nj, "nu": nu})
+def ideal_bus() -> MotorBus:
+    """The bus where motors are ideal: nothing is told."""
+    return MotorBus.allocate({"nj": 0, "nu": 0})
 
 
 @compiled

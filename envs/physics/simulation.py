@@ -18,7 +18,7 @@ from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews, robot_arrays, sim_views
 from .kinematics import StateArrays, allocate_state, update_state
-from .motor_bus import MotorBus, motor_bus
+from .motor_bus import MotorBus, ideal_bus
 from .state import RobotState
 
 SOME_PUSHES = 4  # rows of a table that may grow
@@ -93,7 +93,7 @@ class Simulation(Copyable):
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
         self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
-        self.equip(Program.of(()), Program.of(()), motor_bus())
+        self.equip(Program.of(()), Program.of(()), ideal_bus())
         self.reset()
 
     def equip(self, motors: Program, sensors: Program, bus: MotorBus) -> None:

@@ -7,7 +7,7 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
-from poise.envs.physics.motor_bus import motor_bus
+from poise.envs.physics.motor_bus import ideal_bus
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 
@@ -38,7 +38,7 @@ class StateSource(Copyable):
     def __init__(self, simulation: Simulation):
         self.simulation = simulation
         self.arrays, self.state_arrays = simulation.arrays, simulation.state_arrays
-        self.bus = motor_bus()
+        self.bus = ideal_bus()
         self.promise: np.ndarray = guarded_zeros(0)
         self.drive = Program.of(())
         self.sense, self.estimate = Program.of(()), Program.of(())

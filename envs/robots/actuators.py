@@ -50,10 +50,8 @@ def model_torque_limits(model: mujoco.MjModel) -> dict[str, float]:
 def install_motors(spec: mujoco.MjSpec, model: mujoco.MjModel, overrides: dict[str, float]) -> None:
     """Replace all actuators by one motor of gear 1 per driven joint, in the order of the joints.
 
-    Args:
-        spec: changed in place.
-        model: the spec compiled, all joints named.
-        overrides: joint name or pattern → limit [N·m]; wins over the model's limits.
+    The spec is changed in place; `model` is the spec compiled, all joints named. `overrides`, joint
+    name or pattern → limit [N·m], win over the model's limits.
 
     Raises:
         ConfigError: nothing bounds the torque of a joint, or no joint is driven.

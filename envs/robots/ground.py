@@ -11,6 +11,9 @@ OVERRIDE = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
 NEEDED = {name: int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")) for name in (
     "constraint", "contact", "gravity", "clampctrl", "actuation", "sensor")}  # fmt: skip
 CONTACT_SENSOR = "contact_"  # prefix of the sensors' names
+EDGE_SENSOR = "edges_"  # prefix of the sensors of contacts' directions
+SLOTS = 16  # contacts of a foot that such a sensor shows
+FOUND, NORMAL = 1, 32  # bits of what a contact sensor gives
 
 
 def can_touch(model: mujoco.MjModel, geom: int, other: int) -> bool:
@@ -46,26 +49,27 @@ def _pair_friction(model: mujoco.MjModel, geom: int, other: int) -> float:
     return float(max(friction[geom], friction[other]))
 
 
-def add_contact_sensors(spec: mujoco.MjSpec, description: RobotDescription, ground: str) -> None:
-    """Sensors of the number of contacts with the ground: of all bodies, and of each foot."""
-    found = [1, 0, 1]  # data: "found"; no reduction; one slot
-    spec.add_sensor(
-        name=f"{CONTACT_SENSOR}ground",
-        type=mujoco.mjtSensor.mjSENS_CONTACT,
-        objtype=mujoco.mjtObj.mjOBJ_GEOM,
-        objname=ground,
-        intprm=found,
-    )
-    for foot in description.feet:
-        spec.add_sensor(
-            name=CONTACT_SENSOR + foot.name,
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_XBODY,  # the foot's whole subtree
-            objname=foot.body,
-            reftype=mujoco.mjtObj.mjOBJ_GEOM,
-            refname=ground,
-            intprm=found,
-        )
+def add_contact_sensors(
+    spec: mujoco.MjSpec, description: RobotDescription, ground: str | None
+) -> None:
+    """Sensors of the number of contacts with the ground: of all bodies, and of each foot.
+
+    The ground is the plane of this name; None: all that does not move, a terrain, of whose contacts
+    with a foot a further sensor has the directions.
+    """
+    geom, world = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_BODY
+    kind, name = (world, "world") if ground is None else (geom, ground)
+    sensor = mujoco.mjtSensor.mjSENS_CONTACT
+    counted = [FOUND, 0, 1]  # data; no reduction; one slot
+    all_bodies = f"{CONTACT_SENSOR}ground"
+    spec.add_sensor(name=all_bodies, type=sensor, objtype=kind, objname=name, intprm=counted)
+    for foot in description.feet:  # its whole subtree
+        between = {"objtype": mujoco.mjtObj.mjOBJ_XBODY, "objname": foot.body,
+                   "reftype": kind, "refname": name}  # fmt: skip
+        spec.add_sensor(name=CONTACT_SENSOR + foot.name, type=sensor, intprm=counted, **between)
+        if ground is None:
+            shown = [FOUND | NORMAL, 0, SLOTS]
+            spec.add_sensor(name=EDGE_SENSOR + foot.name, type=sensor, intprm=shown, **between)
 
 
 def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:

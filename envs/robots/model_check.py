@@ -19,9 +19,7 @@ def check_numbers(model: mujoco.MjModel, dynamics: tuple[str, ...]) -> None:
     """Raise ConfigError for numbers of the model that are not finite, and for options that no
     robot stands with: another gravity than down, endless iterations.
 
-    Args:
-        model: compiled.
-        dynamics: names of the arrays that its motion depends on, which must not be huge either.
+    `dynamics` are the arrays that its motion depends on, which must not be huge either.
     """
     for name in (each for each in dir(model) if not each.startswith("_")):
         value = getattr(model, name)
@@ -106,15 +104,6 @@ def _named(model: mujoco.MjModel, joints: list[int]) -> str:
              for joint in joints[:6]}  # fmt: skip
     names = [f"the {kind} joint {model.joint(joint).name!r}" for joint, kind in kinds.items()]
     return ", ".join(names) + (f" and {len(joints) - 6} more" if len(joints) > 6 else "")
-
-
-def check_standing(data: mujoco.MjData, root: int) -> None:
-    """Raise ConfigError unless the centre of mass is above the ground in the standing posture."""
-    height = data.subtree_com[root, 2]
-    if not 0.0 < height < np.inf:
-        raise ConfigError(
-            f"the centre of mass would be at {height:g} m, not above the ground", field="posture"
-        )
 
 
 def _wrong(problem: str) -> ConfigError:

@@ -14,7 +14,7 @@ from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.maths.pendulum import Units
-from poise.envs.terrain.building import EDGE_SENSOR, add_terrain_sensors, build_terrain
+from poise.envs.terrain.building import build_terrain
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Terrain
 
@@ -23,6 +23,7 @@ from .description import RobotDescription
 from .floors import add_paired_ground, check_ground, check_scenery, install_ground
 from .ground import (
     CONTACT_SENSOR,
+    EDGE_SENSOR,
     add_contact_sensors,
     install_daylight,
     set_options,
@@ -30,7 +31,7 @@ from .ground import (
 )
 from .guess import MODELS, guess
 from .menagerie import model_file, ros_file
-from .model_check import check_bodies, check_numbers, check_standing
+from .model_check import check_bodies, check_numbers
 from .models.humanoid import humanoid_spec
 from .models.mjcf import pointing_to_scenes, read_mjcf
 from .models.mjcf_bounds import bound_cache
@@ -234,13 +235,8 @@ def _load(path: Path, terrain: Terrain, description: RobotDescription | None = N
         },
         notes=tuple(notes),
     )
-    for array in (
-        *keyframes.values(),
-        standing_qpos,
-        robot.joint_range,
-        robot.motor_dofs,
-        robot.torque_limit,
-    ):
+    constant = (standing_qpos, robot.joint_range, robot.motor_dofs, robot.torque_limit)
+    for array in (*keyframes.values(), *constant):
         array.setflags(write=False)
     return robot
 
@@ -281,7 +277,11 @@ def _stand(
     data.qpos[2] -= TOUCH
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
-    check_standing(data, root)
+    height = data.subtree_com[root, 2]
+    if not 0.0 < height < np.inf:
+        raise ConfigError(
+            f"the centre of mass would be at {height:g} m, not above the ground", field="posture"
+        )
     return data, soles
 
 
@@ -322,12 +322,9 @@ def _prepare(
     install_motors(spec, model, description.torque_limits)
     set_passive(spec, description)
     notes += switch_on(spec)
-    if terrain.flat:
-        add_contact_sensors(spec, description, ground)
-    else:
+    if not terrain.flat:
         build_terrain(spec, terrain, ground)
-        feet = [(foot.name, foot.body) for foot in description.feet]
-        add_terrain_sensors(spec, CONTACT_SENSOR, feet)
+    add_contact_sensors(spec, description, ground if terrain.flat else None)
     set_options(spec, description.options)
     for note in notes:
         warnings.warn(f"{path}: {note}", PoiseWarning, stacklevel=4)

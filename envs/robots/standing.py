@@ -65,19 +65,13 @@ def described_qpos(
 @dataclass(frozen=True, eq=False)
 class Stance:
     """A robot whose `data.qpos` is changed until it stands; after each change its kinematics are
-    up to date.
-
-    Attributes:
-        root: id of the root body.
-        feet: ids of the two foot bodies.
-        planes: where each foot rests.
-    """
+    up to date."""
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    root: int
-    feet: Sequence[int]
-    planes: Sequence[SolePlane]
+    root: int  # id of the root body
+    feet: Sequence[int]  # ids of the two foot bodies
+    planes: Sequence[SolePlane]  # where each foot rests
 
     def level_soles(self) -> None:
         """Turn the leg joints a little so that both soles are level and equally high.

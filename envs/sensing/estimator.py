@@ -35,24 +35,8 @@ from .external_force import (
     observe_force,
 )
 from .friction import SlidingFriction, allocate_friction, begin_friction, learn_friction
-from .inekf import (
-    ATTITUDE,
-    ENCODER,
-    FORCE,
-    FORCE_WALK,
-    GYRO,
-    GYRO_WALK,
-    KINEMATICS,
-    LIFT,
-    SLIDE,
-    Invariant,
-    InvariantConfig,
-    begin_invariant,
-    follow_invariant,
-)
-from .inekf import ROLL as FOOT_ROLL
+from .inekf import Invariant, InvariantConfig, begin_invariant, follow_invariant
 from .measurement import (
-    DRIFT_TIME,
     RING,
     Rings,
     Sensors,
@@ -61,21 +45,7 @@ from .measurement import (
     measure,
 )
 from .motors import Motors, begin_motors, drive_motors
-from .odometry import (
-    BB,
-    JOINT_NOISE,
-    RATE_GAIN,
-    ROLL,
-    SLIP,
-    STIR,
-    VV,
-    WANDER,
-    Odometry,
-    copy_axes,
-    filter_gains,
-    follow_measurements,
-    rate_gain,
-)
+from .odometry import Odometry, begin_odometry, copy_axes, follow_measurements
 from .plant import Plant
 from .prediction import Promises, Rollout, keep_promises, predict, roll_out
 from .realism import Realism
@@ -83,7 +53,6 @@ from .realism import Realism
 POSITIVE = {"above": 0.0}
 #: entries of `Belief.steps`
 SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(8)
-START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
 WITHOUT_CONTACTS: WeakKeyDictionary[Robot, Robot] = WeakKeyDictionary()
@@ -322,52 +291,13 @@ class EstimatedState(StateSource, Copyable):
         begin_force(self.belief.force, self.config.load_time if loaded else 0.0)
         self.state_arrays.load[:] = 0.0
         begin_friction(self.belief.friction, self.state_arrays, self.config.slide_speed)
-        self._begin_odometry()
-        self._begin_invariant()
-        self.update()
-
-    def _begin_odometry(self) -> None:
-        """The robot was at its start for long: what was measured there is averaged."""
-        o, r, d, c = self.odometry, self.sensors.rings, self.drawn.noise, self.config
-        o.promises.last[:], o.promises.rows[:], o.promises.written[0] = 0.0, 0.0, 0
-        o.seen[0] = 1
-        o.position[:] = r.truth_qpos[0, :3]
-        o.axes[:] = r.attitude[r.next[0] - 1]
-        o.q[:], o.v[:] = r.q.mean(axis=0), 0.0
-        o.v[3:6], o.v[6:] = r.gyro.mean(axis=0), r.dq.mean(axis=0)
-        o.bias[:] = o.variance[:] = 0.0
-        o.variance[VV], o.variance[BB] = START_SPEED**2, c.bias**2
-        dt, noise = self.arrays.timestep, o.numbers
-        noise[STIR] = np.hypot(c.acceleration, d["accelerometer_noise"])
-        noise[WANDER], noise[SLIP], noise[ROLL] = c.bias_walk, c.slip, c.roll_radius
-        noise[JOINT_NOISE] = d["velocity_noise"]
-        if c.filtered:
-            gains = filter_gains(dt, c.joint_acceleration, d["encoder_noise"], d["velocity_noise"])
-            o.gains[:] = gains
-            o.numbers[RATE_GAIN] = rate_gain(dt, c.turn_acceleration, d["gyro_noise"])
-        else:
-            o.gains[:], o.numbers[RATE_GAIN] = np.eye(2), 1.0
-
-    def _begin_invariant(self) -> None:
-        """Start at the odometry's state, with what the sensors' noises are thought to be."""
-        f, d, c, o = self.invariant, self.drawn.noise, self.config, self.odometry
+        begin_odometry(self.odometry, self.drawn.noise, self.config)
         turn = np.zeros(4)
-        quaternion_of(o.axes, turn)
+        quaternion_of(self.odometry.axes, turn)
         for each in (self.known, self.ahead):  # not where an episode ended
-            each.reset(np.concatenate([o.position, turn, o.q]))
-        own, noise, dt = c.invariant, self.invariant.numbers, self.arrays.timestep
-        drift = np.hypot(own.attitude, d["tilt_drift"] * np.sqrt(2.0 * DRIFT_TIME / dt))
-        noise[GYRO], noise[FORCE] = (
-            d["gyro_noise"],
-            np.hypot(c.acceleration, d["accelerometer_noise"]),
-        )
-        noise[GYRO_WALK], noise[FORCE_WALK] = own.gyro_bias_walk, c.bias_walk
-        noise[ATTITUDE], noise[ENCODER] = drift, d["encoder_noise"]
-        noise[KINEMATICS], noise[SLIDE] = own.kinematics, own.slide
-        noise[FOOT_ROLL], noise[LIFT] = own.roll, own.lift
-        begin_invariant(
-            f, np.hypot(own.attitude, d["tilt_drift"]), START_SPEED, own.gyro_bias, c.bias
-        )
+            each.reset(np.concatenate([self.odometry.position, turn, self.odometry.q]))
+        begin_invariant(self.invariant, self.drawn.noise, self.config)
+        self.update()
 
     def reset(self) -> None:
         """Nothing: `begin` says who the robot is."""

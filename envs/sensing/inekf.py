@@ -13,7 +13,7 @@ linear equation exactly, wherever the state is [Barrau17].
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -21,8 +21,12 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
 
-from .odometry import LOAD, Odometry, copy_axes, keep_joints, place_pressure
+from .measurement import DRIFT_TIME
+from .odometry import LOAD, START_SPEED, Odometry, copy_axes, keep_joints, place_pressure
 from .prediction import turn_axes
+
+if TYPE_CHECKING:
+    from .estimator import EstimatorConfig
 
 V, P_, D = 0, 1, 2  # rows of `Invariant.place`; D is the first sole's
 #: entries of `Invariant.numbers`
@@ -73,8 +77,21 @@ class Invariant(Block):
     numbers: Annotated[np.ndarray, 10]  # see GYRO and its like
 
 
+def begin_invariant(f: Invariant, noises: dict[str, float], c: EstimatorConfig) -> None:
+    """Start at the odometry's state, with what the sensors' noises are thought to be."""
+    own, noise, drift = c.invariant, f.numbers, noises["tilt_drift"]
+    white = drift * np.sqrt(2.0 * DRIFT_TIME / f.odometry.robot.timestep)
+    noise[GYRO] = noises["gyro_noise"]
+    noise[FORCE] = np.hypot(c.acceleration, noises["accelerometer_noise"])
+    noise[GYRO_WALK], noise[FORCE_WALK] = own.gyro_bias_walk, c.bias_walk
+    noise[ATTITUDE], noise[ENCODER] = np.hypot(own.attitude, white), noises["encoder_noise"]
+    noise[KINEMATICS], noise[SLIDE] = own.kinematics, own.slide
+    noise[ROLL], noise[LIFT] = own.roll, own.lift
+    begin_state(f, np.hypot(own.attitude, drift), START_SPEED, own.gyro_bias, c.bias)
+
+
 @compiled
-def begin_invariant(f: Invariant, attitude: float, speed: float, gyro: float, force: float):
+def begin_state(f: Invariant, attitude: float, speed: float, gyro: float, force: float):
     """Start where the odometry's state is, with these deviations of R, v and the biases."""
     o, P = f.odometry, f.P
     n, nc = P.shape[0], f.place.shape[0] - 2

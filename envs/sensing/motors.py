@@ -27,9 +27,7 @@ class Motors(Block):
     views: SimViews
     bus: MotorBus
     asked: Annotated[np.ndarray, RING, 4, "nu"]  # asked for: torque, target, stiffness, damping
-    written: Annotated[
-        np.ndarray, 1, np.int64
-    ]  # rows written since the reset; the next one follows
+    written: Annotated[np.ndarray, 1, np.int64]  # rows since the reset; the next one follows
     late: Annotated[np.ndarray, 1, np.int64]  # physics steps
     torque: Annotated[np.ndarray, "nu"]  # that act [N·m]
     gain: Annotated[np.ndarray, "nu"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -18,11 +18,15 @@ from poise.envs.physics.kinematics import StateArrays
 from .measurement import Rings
 from .prediction import Promises
 
+if TYPE_CHECKING:
+    from .estimator import EstimatorConfig
+
 FROM_Q, FROM_DQ = 0, 1  # columns of `Odometry.gains`
 STIR, WANDER, SLIP, ROLL, JOINT_NOISE, RATE_GAIN = range(6)  # entries of `Odometry.numbers`
 LEAST = 1e-5, 1e-2  # noises of a joint's position and velocity [rad, rad/s]
 LOAD = 2  # column of `Odometry.pressed`
 VV, VB, BB = range(3)  # entries of `Odometry.variance`
+START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +48,31 @@ class Odometry(Block):
     told: Annotated[np.ndarray, 6]  # how a sole moves against a resting root [m/s, rad/s]
     gains: Annotated[np.ndarray, 2, 2]  # rows q, q̇: corrections by errors of q and q̇
     numbers: Annotated[np.ndarray, 6]  # see STIR and its like
+
+
+def begin_odometry(o: Odometry, noises: dict[str, float], c: EstimatorConfig) -> None:
+    """Start where the robot was for long: what was measured there is averaged.
+
+    `noises` are the sensors' deviations by the names of `SensorErrors`.
+    """
+    r, dt, noise = o.rings, o.robot.timestep, o.numbers
+    o.promises.last[:], o.promises.rows[:], o.promises.written[0] = 0.0, 0.0, 0
+    o.seen[0] = 1
+    o.position[:] = r.truth_qpos[0, :3]
+    o.axes[:] = r.attitude[r.next[0] - 1]
+    o.q[:], o.v[:] = r.q.mean(axis=0), 0.0
+    o.v[3:6], o.v[6:] = r.gyro.mean(axis=0), r.dq.mean(axis=0)
+    o.bias[:] = o.variance[:] = 0.0
+    o.variance[VV], o.variance[BB] = START_SPEED**2, c.bias**2
+    noise[STIR] = np.hypot(c.acceleration, noises["accelerometer_noise"])
+    noise[WANDER], noise[SLIP], noise[ROLL] = c.bias_walk, c.slip, c.roll_radius
+    q_noise, v_noise = noises["encoder_noise"], noises["velocity_noise"]
+    noise[JOINT_NOISE] = v_noise
+    if c.filtered:
+        o.gains[:] = filter_gains(dt, c.joint_acceleration, q_noise, v_noise)
+        noise[RATE_GAIN] = rate_gain(dt, c.turn_acceleration, noises["gyro_noise"])
+    else:
+        o.gains[:], noise[RATE_GAIN] = np.eye(2), 1.0
 
 
 @lru_cache(maxsize=256)  # a Riccati equation at each reset would take most of it

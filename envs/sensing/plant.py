@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError
-from poise.envs.physics.arms import check_arms, find_arms
+from poise.envs.physics.arms import ROLES, find_arms
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, on_terrain
@@ -100,5 +100,11 @@ class Plant:
 def check_limbs(level: Realism, robot: Robot) -> None:
     """Raise ConfigError where a level moves or loads arms, and the robot has none."""
     for field, spread in (("motors.arms", level.motors.arms), ("body.hand", level.body.hand)):
-        if np.any(spread):
-            check_arms(robot, level.name, field)
+        if np.any(spread) and not find_arms(robot):
+            raise ConfigError(
+                f"the robot {robot.name} has no arms: its description has not the roles "
+                f"{' and '.join(ROLES)}",
+                source=level.name,
+                field=field,
+                choices=robot.description.roles or ("no roles",),
+            )

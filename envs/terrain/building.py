@@ -1,6 +1,4 @@
-"""Terrain in MuJoCo: a box under every surface, and the sensors that see all of it."""
-
-from collections.abc import Iterable
+"""Terrain in MuJoCo: a box under every surface."""
 
 import mujoco
 import numpy as np
@@ -10,9 +8,6 @@ from .terrain import Surface, Terrain
 THICKNESS = 0.05  # [m] of a box below the floor; half of that of a slanting one
 SHADES = ((0.80, 0.82, 0.84, 1.0), (0.70, 0.72, 0.75, 1.0))
 BUILT = "terrain_"  # prefix of the geoms, the surface's number behind it
-EDGE_SENSOR = "edges_"  # prefix of the sensors of contacts' directions
-SLOTS = 16  # contacts of a foot that such a sensor shows
-FOUND, NORMAL = 1, 32  # bits of what a contact sensor gives
 ALIKE = (  # what a box has of the plane beneath it
     *("contype", "conaffinity", "condim", "priority", "margin", "gap", "solmix"),
     *("friction", "solref", "solimp"),
@@ -62,21 +57,3 @@ def _copy_pair(spec: mujoco.MjSpec, pair: mujoco.MjsPair, ground: str, name: str
         margin=pair.margin, gap=pair.gap, solref=pair.solref, solreffriction=pair.solreffriction,
         solimp=pair.solimp,
     )  # fmt: skip
-
-
-def add_terrain_sensors(spec: mujoco.MjSpec, prefix: str, feet: Iterable[tuple[str, str]]) -> None:
-    """Sensors of contacts with all that does not move, as `add_contact_sensors` has of a plane.
-
-    Args:
-        prefix: of the names of the sensors that count.
-        feet: name and body of each.
-    """
-    world = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "objname": "world"}
-    contact = mujoco.mjtSensor.mjSENS_CONTACT
-    spec.add_sensor(name=f"{prefix}ground", type=contact, intprm=[FOUND, 0, 1], **world)
-    for name, body in feet:
-        between = {"objtype": mujoco.mjtObj.mjOBJ_XBODY, "objname": body,
-                   "reftype": mujoco.mjtObj.mjOBJ_BODY, "refname": "world"}  # fmt: skip
-        spec.add_sensor(name=prefix + name, type=contact, intprm=[FOUND, 0, 1], **between)
-        shown = [FOUND | NORMAL, 0, SLOTS]
-        spec.add_sensor(name=EDGE_SENSOR + name, type=contact, intprm=shown, **between)

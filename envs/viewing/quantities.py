@@ -10,15 +10,10 @@ RGB = tuple[float, float, float]  # of 0 to 1
 
 
 class Quantity(NamedTuple):
-    """A quantity that is drawn.
+    """A quantity that is drawn."""
 
-    Attributes:
-        label: what people read.
-        colour: of its marks, and of its lines over time.
-    """
-
-    label: str
-    colour: RGB
+    label: str  #: what people read
+    colour: RGB  #: of its marks, and of its lines over time
 
     @property
     def hexadecimal(self) -> str:

@@ -6,7 +6,6 @@ not computed. All that a term may read are the fields of `RewardView`.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from typing import Literal
 
 import numpy as np
 
@@ -165,12 +164,14 @@ def fall_cost(v: RewardView) -> float:
     return -1.0
 
 
-#: of a term: it is not earned in the step of a fall; it is paid then too, unless the simulation
-#: diverged; it is paid then only
-When = Literal["no fall", "no divergence", "fall"]
+# of a term: it is not earned in the step of a fall; it is paid then too, unless the simulation
+# diverged; it is paid then only
+NO_FALL, NO_DIVERGENCE, FALL = range(3)
 
 
-def _term(weight: float, kernel: Callable[[RewardView], float], formula: str, when: When) -> float:
+def _term(
+    weight: float, kernel: Callable[[RewardView], float], formula: str, when: int = NO_FALL
+) -> float:
     """A field of `RewardWeights`; a term that is off by default is left out of files while off."""
     metadata = {"kernel": kernel, "formula": formula, "when": when}
     off = {"omit": "default"} if weight == 0.0 else {}
@@ -181,57 +182,49 @@ def _term(weight: float, kernel: Callable[[RewardView], float], formula: str, wh
 class RewardWeights:
     """Weights of the reward terms; each term is smooth and lies in [0, 1] or [−1, 0]."""
 
-    alive: float = _term(0.5, constant, "1", "no fall")
+    alive: float = _term(0.5, constant, "1")
     com: float = _term(
         0.2, com_near,
-        "exp(−4 e²), e the CoM's distance from the middle of the soles [half support]", "no fall",
+        "exp(−4 e²), e the CoM's distance from the middle of the soles [half support]",
     )  # fmt: skip
-    capture: float = _term(
-        0.2, capture_near, "exp(−2 e²), e the capture point's [half support]", "no fall"
-    )
+    capture: float = _term(0.2, capture_near, "exp(−2 e²), e the capture point's [half support]")
     upright: float = _term(
-        0.1, root_upright, "max(cos φ, 0)⁴, φ the tilt of the root from standing", "no fall"
+        0.1, root_upright, "max(cos φ, 0)⁴, φ the tilt of the root from standing"
     )
-    quiet: float = _term(0.1, com_slow, "exp(−(|ċ| / quiet_speed)² / 4)", "no fall")
-    posture: float = _term(0.1, posture_near, "exp(−Σ (q − q_ref)²)", "no fall")
-    effort: float = _term(0.02, torque_cost, "−mean (τ / τ_max)²", "no divergence")
-    action: float = _term(0.1, action_cost, "−mean a²", "no divergence")
-    action_rate: float = _term(
-        0.05, action_change_cost, "−mean (a − a_before)² / 4", "no divergence"
-    )
-    fall: float = _term(5.0, fall_cost, "−1 in the step of a fall", "fall")
+    quiet: float = _term(0.1, com_slow, "exp(−(|ċ| / quiet_speed)² / 4)")
+    posture: float = _term(0.1, posture_near, "exp(−Σ (q − q_ref)²)")
+    effort: float = _term(0.02, torque_cost, "−mean (τ / τ_max)²", NO_DIVERGENCE)
+    action: float = _term(0.1, action_cost, "−mean a²", NO_DIVERGENCE)
+    action_rate: float = _term(0.05, action_change_cost, "−mean (a − a_before)² / 4", NO_DIVERGENCE)
+    fall: float = _term(5.0, fall_cost, "−1 in the step of a fall", FALL)
     angular_momentum: float = _term(
-        0.0, momentum_small, "exp(−(|L| / 0.1 m h² ω)²), L about the CoM", "no fall"
+        0.0, momentum_small, "exp(−(|L| / 0.1 m h² ω)²), L about the CoM"
     )
     velocity: float = _term(
-        0.0, velocity_small, "exp(−(ċ_xy / 0.2 ω h)²), of the CoM along the ground", "no fall"
+        0.0, velocity_small, "exp(−(ċ_xy / 0.2 ω h)²), of the CoM along the ground"
     )
     turning: float = _term(
-        0.0, turning_small, "exp(−(|ω_root| / 0.5 ω)²), angular velocity of the root", "no fall"
+        0.0, turning_small, "exp(−(|ω_root| / 0.5 ω)²), angular velocity of the root"
     )
     joint_limits: float = _term(
         0.0, joint_limit_cost,
-        "−mean fraction of the last 5 % of a joint's range, at either end", "no divergence",
+        "−mean fraction of the last 5 % of a joint's range, at either end", NO_DIVERGENCE,
     )  # fmt: skip
     slip: float = _term(
         0.0, slip_cost,
-        "−mean min((ṗ_xy / 0.2 ω h)², 1) of the soles, 0 of those in the air", "no divergence",
+        "−mean min((ṗ_xy / 0.2 ω h)², 1) of the soles, 0 of those in the air", NO_DIVERGENCE,
     )  # fmt: skip
     tracking: float = _term(
         0.0, command_followed,
-        "exp(−(|Δv| / 0.02 ω h)² − (Δψ̇ / 0.05 ω)²), of a walk's last stride from its command",
-        "no fall",
+        "exp(−(|Δv| / 0.02 ω h)² − (Δψ̇ / 0.05 ω)²), of a walk's last stride from its command"
     )  # fmt: skip
     pace: float = _term(
         0.0, pace_kept,
-        "exp(−(|Δv| / 0.06 ω h)²), which still tells a walk that is far too slow to go faster",
-        "no fall",
+        "exp(−(|Δv| / 0.06 ω h)²), which still tells a walk that is far too slow to go faster"
     )  # fmt: skip
 
 
 REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)
-NO_FALL, NO_DIVERGENCE, FALL = range(3)  # `When`, for compiled code
-_CODES = {"no fall": NO_FALL, "no divergence": NO_DIVERGENCE, "fall": FALL}
 
 
 def reward_table() -> str:
@@ -259,7 +252,7 @@ def rewards(weights: RewardWeights, view: RewardView) -> Rewards:
         (term.metadata["kernel"], view) if weight != 0.0 else None
         for term, weight in zip(terms, numbers, strict=True)
     ]
-    when = np.array([_CODES[term.metadata["when"]] for term in terms], dtype=np.int64)
+    when = np.array([term.metadata["when"] for term in terms], dtype=np.int64)
     return Rewards(kernels=Program.of(calls), weights=numbers, when=when)
 
 

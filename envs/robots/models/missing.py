@@ -19,12 +19,8 @@ def drop_missing(spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...]) -> None
     """Take what has a missing file out of a model, with one warning that names it.
 
     MuJoCo itself decides what is missing: it alone knows the folders of included and attached
-    files. Where it opens every file, nothing is changed.
-
-    Args:
-        spec: the model, changed in place.
-        path: its file, for the warning.
-        feet: names of the foot bodies.
+    files. Where it opens every file, nothing is changed. `path` is the model's file, for the
+    warning; `feet` are the names of the foot bodies.
 
     Raises:
         ConfigError: a foot collides with a missing mesh, or a body has its mass from it.

@@ -20,11 +20,7 @@ def read_mjcf(path: Path, feet: tuple[str, ...]) -> mujoco.MjSpec:
     """The model in an MJCF file, as MuJoCo reads it by its absolute path.
 
     What needs a missing file is dropped with a warning, see `drop_missing`. That is refused for a
-    mesh that a foot collides with, or that gives a body its mass.
-
-    Args:
-        path: the MJCF file.
-        feet: names of the foot bodies.
+    mesh that a foot, one of these bodies, collides with, or that gives a body its mass.
 
     Raises:
         ConfigError: the file is missing or does not parse, is larger than a robot's model is, or
@@ -48,9 +44,8 @@ def read_mjcf(path: Path, feet: tuple[str, ...]) -> mujoco.MjSpec:
 def pointing_to_scenes(path: Path | None, element: str) -> Iterator[None]:
     """A ConfigError raised meanwhile also names the scene files that may be what was meant.
 
-    Args:
-        path: the MJCF file of the robot; None: there is none.
-        element: what a scene file may add to it, a key of `SCENE_ELEMENTS`.
+    `path` is the robot's MJCF file, if it has one; a scene may add an `element` to it, a key of
+    `SCENE_ELEMENTS`.
     """
     try:
         yield

@@ -105,7 +105,7 @@ def test_a_relative_folder_is_refused(room: Path, monkeypatch, caches: str) -> N
 def test_without_a_cache_one_line_says_so(tmp_path: Path) -> None:
     """Once, when something compiles; and it compiles."""
     code = (
-        "from poise.envs.compiled import jit; jit.tell(); jit.tell(); "
+        "from poise.envs.compiled import jit; jit.patience.tell(); jit.patience.tell(); "
         "from poise.envs.compiled.maths.pendulum import compiled_rate; "
         "print(compiled_rate(9.81, 1.0))"
     )

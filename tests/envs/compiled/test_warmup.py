@@ -34,7 +34,7 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     monkeypatch.setattr(jit, "CACHE", tmp_path)
     monkeypatch.setattr(warmup, "_compile_apart", compile_apart)
     monkeypatch.setattr(warmup, "_tried", set())
-    monkeypatch.setattr(jit, "tell", lambda: None)
+    monkeypatch.setattr(jit.patience, "tell", lambda: None)
     return found
 
 
