@@ -95,9 +95,11 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             self.config.fall, self.robot.height_com, self.max_steps, self.quiet_steps
         )
         self.action_names = self._action_names()
-        self._newest = self._observation_terms()
-        self._privileged = self.terms_by_name(self.config.observation.privileged)
-        seen = frames(self._newest, self.config.observation.history)
+        names, chosen = self._entry_names(), self.config.observation
+        kinds = self.known_terms.choose(chosen.terms, chosen.extra)
+        self._newest = [kind.of(names) for kind in kinds]
+        self._privileged = self.terms_by_name(chosen.privileged)
+        seen = frames(self._newest, chosen.history)
         #: of which the observation is made
         self.terms = [*seen, *(replace(t, name=f"true_{t.name}") for t in self._privileged)]
         size = sum(term.size for term in self.terms)
@@ -152,11 +154,6 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     def _action_names(self) -> tuple[str, ...]:
         """The names of the action's entries."""
         raise NotImplementedError
-
-    def _observation_terms(self) -> list[Term]:
-        """The terms that `config.observation` chooses of `known_terms`, for this robot."""
-        chosen, names = self.config.observation, self._entry_names()
-        return [kind.of(names) for kind in self.known_terms.choose(chosen.terms, chosen.extra)]
 
     def terms_by_name(self, chosen: Sequence[str]) -> list[Term]:
         """Terms of this robot that every environment has, as `observation.privileged` names them.

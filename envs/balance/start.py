@@ -71,10 +71,7 @@ def reset_options(options: object, known: Sequence[str] = RESET_OPTIONS) -> dict
 
 
 def chosen_start(
-    simulation: Simulation,
-    noise: StartNoise,
-    options: Mapping[str, Any],
-    rng: np.random.Generator,
+    simulation: Simulation, noise: StartNoise, options: Mapping[str, Any], rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the start (nq,), (nv,) of `options`, disturbed where these do not say it.
 

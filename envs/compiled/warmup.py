@@ -97,14 +97,19 @@ def _compile_apart(module: str, parts: Sequence[str]) -> bool:
 
 def compile_here(module: ModuleType, parts: Sequence[str]) -> None:
     """This process compiles these parts, one after the other, and ends soon after."""
-    global _compiling
-    _compiling = True
-    jit.patience.announced = True  # the process that started this one has told the user
+    begin()
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)  # looking for garbage of Numba's takes a tenth of the time
     for part in parts:
         getattr(module, part)()
         end(module.__name__, part)
+
+
+def begin() -> None:
+    """This process compiles: it has nothing to wait for, and its starter has told the user."""
+    global _compiling
+    _compiling = True
+    jit.patience.announced = True
 
 
 def end(module: str, part: str) -> None:

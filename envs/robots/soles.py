@@ -46,10 +46,7 @@ class SolePlane:
 
 
 def sole_geoms(
-    model: mujoco.MjModel,
-    body_id: int,
-    names: tuple[str, ...],
-    ground: int,
+    model: mujoco.MjModel, body_id: int, names: tuple[str, ...], ground: int
 ) -> tuple[int, ...]:
     """The geoms of a sole: those named, or all that are fixed to the foot and touch the ground.
 
@@ -84,10 +81,7 @@ def sole_geoms(
 
 
 def find_sole_plane(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    body_id: int,
-    geom_ids: tuple[int, ...],
+    model: mujoco.MjModel, data: mujoco.MjData, body_id: int, geom_ids: tuple[int, ...]
 ) -> SolePlane:
     """The plane on which the foot would rest, near the horizontal in the present posture.
 

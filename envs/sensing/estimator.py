@@ -27,23 +27,10 @@ from poise.envs.robots.robot import Robot, on_terrain
 from poise.envs.terrain.flat import Flat
 
 from .drawn import DrawnRobot
-from .external_force import (
-    ExternalForce,
-    bear_load,
-    begin_force,
-    keep_load,
-    observe_force,
-)
+from .external_force import ExternalForce, bear_load, begin_force, keep_load, observe_force
 from .friction import SlidingFriction, allocate_friction, begin_friction, learn_friction
 from .inekf import Invariant, InvariantConfig, begin_invariant, follow_invariant
-from .measurement import (
-    RING,
-    Rings,
-    Sensors,
-    arrived,
-    begin_sensors,
-    measure,
-)
+from .measurement import RING, Rings, Sensors, arrived, begin_sensors, measure
 from .motors import Motors, begin_motors, drive_motors
 from .odometry import Odometry, begin_odometry, copy_axes, follow_measurements
 from .plant import Plant
@@ -220,9 +207,6 @@ class EstimatedState(StateSource, Copyable):
         plant: the true robot in its world.
         robot: the one that is known.
         config: how its state is estimated.
-
-    Attributes:
-        promise: (nv,) where the controller writes the accelerations that it promises.
     """
 
     def __init__(self, plant: Plant, robot: Robot, config: EstimatorConfig):

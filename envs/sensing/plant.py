@@ -27,13 +27,11 @@ HIGHEST = 0.05  # [m] that a bump is built; an episode lets it down
 
 
 class Plant:
-    """The simulation of a robot whose body and ground differ from those of `robot`.
+    """A `simulation` of a robot whose body and ground differ from those of `robot`, and bumps on it
+    if it is `bumpy`.
 
-    Attributes:
-        robot: that it differs from.
-        simulation: of a model of its own. Sizes, names and motors are those of `robot`, so that a
-            controller made for that fits; its arrays have the true mass.
-        bumpy: whether its ground has bumps.
+    Its model is one of its own. Sizes, names and motors are those of `robot`, so that a controller
+    made for that fits; its arrays have the true mass.
 
     Raises ConfigError for bumps on a terrain.
     """

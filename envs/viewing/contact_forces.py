@@ -27,7 +27,9 @@ class ContactForces:
         """Body id → force (3,) [N] on it, world axes, and the point (3,) [m] where it acts."""
         model, data = self.simulation.model, self._data
         fixed = model.geom_bodyid[:] == 0  # the ground, and what is built on it
-        self._take_state()
+        for name in ("qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart"):
+            getattr(data, name)[:] = getattr(self.simulation.data, name)
+        mujoco.mj_forward(model, data)
         sums: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         wrench = np.zeros(6)
         for i, contact in enumerate(data.contact):
@@ -57,9 +59,3 @@ class ContactForces:
             for force, point in self.find().values()
             if np.linalg.norm(force) > LEAST * weight
         ]  # fmt: skip
-
-    def _take_state(self) -> None:
-        source, own = self.simulation.data, self._data
-        for name in ("qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart"):
-            getattr(own, name)[:] = getattr(source, name)
-        mujoco.mj_forward(self.simulation.model, own)

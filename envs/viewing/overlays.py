@@ -50,9 +50,14 @@ def marks(simulation: Simulation) -> list[Mark]:
     state = simulation.state.copy()  # the support polygon is computed into the state's own arrays
     size = simulation.robot.height_com
     level = state.support_height
-    found, blue = _polygon(state.support_polygon, level, 0.013 * size), CAPTURE_POINT.colour
+    polygon = state.support_polygon
+    corners = np.column_stack([polygon, np.full(len(polygon), level)])
+    found = [
+        Mark("support", BAR, start, end, 0.013 * size, SUPPORT.colour)
+        for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    ]
     point = np.append(state.capture_point, level)
-    found.append(_disc("capture point", point, 0.065 * size, 0.004 * size, blue))
+    found.append(_disc("capture point", point, 0.065 * size, 0.004 * size, CAPTURE_POINT.colour))
     if state.contact_wrench[2] > 1e-3 * state.mass * simulation.arrays.gravity:
         point = np.append(state.cop, level)
         found.append(_disc("cop", point, 0.046 * size, 0.007 * size, COP.colour))
@@ -114,12 +119,3 @@ def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:
 def _disc(name: str, point: np.ndarray, radius: float, height: float, colour: RGB) -> Mark:
     """A disc at `point` (3,), which sticks out of the ground by `height`."""
     return Mark(name, DISC, point, point + [0.0, 0.0, height], radius, colour)
-
-
-def _polygon(vertices: np.ndarray, level: float, radius: float) -> list[Mark]:
-    corners = np.column_stack([vertices, np.full(len(vertices), level)])
-    ends = np.roll(corners, -1, axis=0)
-    return [
-        Mark("support", BAR, start, end, radius, SUPPORT.colour)
-        for start, end in zip(corners, ends, strict=True)
-    ]

@@ -129,12 +129,7 @@ class Terms(dict[str, TermKind]):
         self.view = view
 
     def add(
-        self,
-        entries: Entries,
-        unit: str,
-        meaning: str,
-        image: Image,
-        default: bool = True,
+        self, entries: Entries, unit: str, meaning: str, image: Image, default: bool = True
     ) -> Callable[[F], F]:
         """A decorator: the function, compiled, is the term of its name.
 

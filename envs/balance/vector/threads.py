@@ -75,12 +75,7 @@ class ThreadTeam:
             if error is not None:
                 raise error
 
-    def ask(
-        self,
-        work: Callable[[int], None],
-        helper: int,
-        done: Raised | None = None,
-    ) -> None:
+    def ask(self, work: Callable[[int], None], helper: int, done: Raised | None = None) -> None:
         """`work(helper)` in helper 1, 2…, once it is free; what it raised, or None, goes to `done`.
 
         Raises PoiseError if they have been closed or have died.
