@@ -7,13 +7,12 @@ from poise.baselines.balance.stepping.planning.config import (
     CaptureStepConfig,
     StepLimits,
     SwingTask,
+    number,
 )
 from poise.baselines.whole_body.gains import MomentumQPConfig
 
 from .models.lip import Lip
 from .models.reference import ReferenceModel
-
-POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
 
 
 @dataclass(frozen=True)
@@ -23,59 +22,59 @@ class TreadConfig:
     Fractions are of the time from lift-off to touchdown.
     """
 
-    step_time: float = field(default=1.9, metadata=POSITIVE)
-    transfer_time: float = field(default=0.353, metadata=POSITIVE)
-    time_max: float = field(default=2.47, metadata=POSITIVE)  # by which a step may last
-    time_price: float = field(default=0.018, metadata=NOT_NEGATIVE)
-    height: float = field(default=0.95, metadata=POSITIVE)  # of the CoM above the line of the feet
-    clearance: float = field(default=0.038, metadata=POSITIVE)  # above the higher tread
-    margin: float = field(default=0.0127, metadata=NOT_NEGATIVE)  # from the sole to the edges
-    least_step: float = field(default=0.19, metadata=POSITIVE)  # towards the first tread, and
-    approach: float = field(default=0.46, metadata=POSITIVE)  # the longest of these
-    highest: float = field(default=0.25, metadata=POSITIVE)  # step up or down
-    longest: float = field(default=0.6, metadata=POSITIVE)  # step, from tread to tread
-    hold_up: float = field(default=0.25, metadata=NOT_NEGATIVE)  # before the foot goes forward
-    hold_down: float = field(default=0.1, metadata=NOT_NEGATIVE)
-    rise: float = field(default=0.48, metadata=POSITIVE)  # when it is as high as it gets, going up
-    rise_down: float = field(default=0.3, metadata=POSITIVE)  # the same, going down
-    lower: float = field(default=0.62, metadata=POSITIVE)  # when it begins to come down, going up
-    lower_down: float = field(default=0.8, metadata=POSITIVE)
-    arrive: float = field(default=0.98, metadata=POSITIVE)  # when it is above its foothold
+    step_time: float = number(1.9, "1/ω", above=0.0)
+    transfer_time: float = number(0.353, "1/ω", above=0.0)
+    time_max: float = number(2.47, "1/ω", above=0.0)  # by which a step may last
+    time_price: float = number(0.018, "h ω", min=0.0)
+    height: float = number(0.95, "h", above=0.0)  # of the CoM above the line of the feet
+    clearance: float = number(0.038, "h", above=0.0)  # above the higher tread
+    margin: float = number(0.0127, "h", min=0.0)  # from the sole to the edges
+    least_step: float = number(0.19, "h", above=0.0)  # towards the first tread, and
+    approach: float = number(0.46, "h", above=0.0)  # the longest of these
+    highest: float = number(0.25, "h", above=0.0)  # step up or down
+    longest: float = number(0.6, "h", above=0.0)  # step, from tread to tread
+    hold_up: float = number(0.25, min=0.0)  # before the foot goes forward
+    hold_down: float = number(0.1, min=0.0)
+    rise: float = number(0.48, above=0.0)  # when it is as high as it gets, going up
+    rise_down: float = number(0.3, above=0.0)  # the same, going down
+    lower: float = number(0.62, above=0.0)  # when it begins to come down, going up
+    lower_down: float = number(0.8, above=0.0)
+    arrive: float = number(0.98, above=0.0)  # when it is above its foothold
     # the trunk leans ahead by so much for each h of a rise beyond `lean_from` [rad/h]
-    lean: float = field(default=5.0, metadata=NOT_NEGATIVE)
-    lean_from: float = field(default=0.135, metadata=NOT_NEGATIVE)
+    lean: float = number(5.0, "1/h", min=0.0)
+    lean_from: float = number(0.135, "h", min=0.0)
 
 
 @dataclass(frozen=True)
 class GaitConfig:
     """The gait: its times, its width, how it follows a command, and the QP of its ticks."""
 
-    step_time: float = field(default=1.2, metadata=POSITIVE)  # from lift-off to touchdown
-    transfer_time: float = field(default=0.28, metadata=POSITIVE)  # on both feet
-    width: float = field(default=0.254, metadata=POSITIVE)  # between the soles
-    height: float = field(default=0.966, metadata=POSITIVE)  # of the CoM, where legs reach
-    leg_length: float = field(default=1.04, metadata=POSITIVE)  # that limits it in a long step
+    step_time: float = number(1.2, "1/ω", above=0.0)  # from lift-off to touchdown
+    transfer_time: float = number(0.28, "1/ω", above=0.0)  # on both feet
+    width: float = number(0.254, "h", above=0.0)  # between the soles
+    height: float = number(0.966, "h", above=0.0)  # of the CoM, where legs reach
+    leg_length: float = number(1.04, "h", above=0.0)  # that limits it in a long step
     # what the height follows: `lip` keeps `height`, the others are in models/
     model: ReferenceModel = field(default_factory=Lip, metadata={"omit": "default"})
-    acceleration: float = field(default=0.041, metadata=POSITIVE)  # of the velocity [g]
-    turn_acceleration: float = field(default=0.08, metadata=POSITIVE)  # of the turn [ω²]
+    acceleration: float = number(0.041, "h ω²", above=0.0)  # of the velocity, h ω² = g
+    turn_acceleration: float = number(0.08, "ω²", above=0.0)  # of the turn
     # what is planned is the velocity asked for, and so much of the sum of each step's error
-    correction: float = field(default=0.3, metadata=NOT_NEGATIVE)
-    correction_limit: float = field(default=0.09, metadata=NOT_NEGATIVE)  # [h ω]
-    time_price: float = field(default=0.018, metadata=NOT_NEGATIVE)  # of another step time [h ω]
-    transfer_gain: float = field(default=1.0, metadata=NOT_NEGATIVE)  # of ξ's error on both feet
-    start_radius: float = field(default=0.025, metadata=POSITIVE)  # of ξ before the first step
-    start_time: float = field(default=5.0, metadata=POSITIVE)  # then it begins anyway
-    speed_margin: float = field(default=0.01, metadata=NOT_NEGATIVE)  # slower is standing [h ω]
+    correction: float = number(0.3, min=0.0)
+    correction_limit: float = number(0.09, "h ω", min=0.0)
+    time_price: float = number(0.018, "h ω", min=0.0)  # of another step time
+    transfer_gain: float = number(1.0, min=0.0)  # of ξ's error on both feet
+    start_radius: float = number(0.025, "h", above=0.0)  # of ξ before the first step
+    start_time: float = number(5.0, "1/ω", above=0.0)  # then it begins anyway
+    speed_margin: float = number(0.01, "h ω", min=0.0)  # slower is standing
     # of the joints of arms that swing as commanded, in the posture of the QP
-    arm_weight: float = field(default=30.0, metadata={**POSITIVE, "omit": "default"})
+    arm_weight: float = number(30.0, above=0.0, omit="default")
     # until this fraction of the swing the foot stays as high as it is at `swing.lift`, over its own
     # ground and the stance sole's; 0: it comes down once it is up, and only the latter counts
-    lower: float = field(default=0.0, metadata={"min": 0.0, "max": 0.95, "omit": "default"})
-    torque_rate_limit: float = field(default=0.6, metadata=POSITIVE)  # as in `CaptureStepConfig`
-    root_accel: float = field(default=60.0, metadata=POSITIVE)
-    swing_accel: float = field(default=14.0, metadata=POSITIVE)
-    joint_accel: float = field(default=100.0, metadata=POSITIVE)
+    lower: float = number(0.0, min=0.0, max=0.95, omit="default")
+    torque_rate_limit: float = number(0.6, above=0.0)  # as in `CaptureStepConfig`
+    root_accel: float = number(60.0, "ω²", above=0.0)
+    swing_accel: float = number(14.0, "ω²", above=0.0)
+    joint_accel: float = number(100.0, "ω²", above=0.0)
     limits: StepLimits = field(
         default_factory=lambda: StepLimits(
             ahead=1.1, behind=0.9, width_min=0.19, width_max=0.9, speed=1.3, side_speed=1.2,

@@ -4,7 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from poise.baselines.balance.stepping.planning.config import in_si
 from poise.configs.errors import ConfigError
+from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.robots.robot import Robot
 from poise.envs.terrain.arrays import surface_arrays
 from poise.envs.terrain.terrain import Surface, Terrain
@@ -75,22 +77,15 @@ def _length(surface: Surface) -> float:
     return surface.x_max - surface.x_min
 
 
-def allocate_treads(config: TreadConfig, surfaces: list[Surface], height: float) -> Treads:
-    """The block of the surfaces on which steps are given; `height` is h [m]."""
+def allocate_treads(config: TreadConfig, surfaces: list[Surface], units: Units) -> Treads:
+    """The block of the surfaces on which steps are given."""
     c = config
     return Treads(
+        **in_si(Treads, c, units),
         surfaces=surface_arrays(surfaces),
-        margin=c.margin * height,
-        least_step=c.least_step * height,
-        approach=c.approach * height,
-        highest=c.highest * height,
-        clearance=c.clearance * height,
         hold=np.array([c.hold_up, c.hold_down]),
         rise=np.array([c.rise, c.rise_down]),
         lower=np.array([c.lower, c.lower_down]),
-        arrive=float(c.arrive),
-        lean=c.lean / height,
-        lean_from=c.lean_from * height,
         leaning=np.zeros(1),
         left=np.zeros(3),
         aim=np.zeros(1, dtype=np.int64),

@@ -18,7 +18,7 @@ from poise.envs.robots.robot import Robot
 
 from .config import GaitConfig
 from .controller import Commanded
-from .models.leg_joints import leg_joints
+from .models.legs import leg_joints
 from .planner.command import STEP_PARAMETERS, GaitCommand
 from .walk import allocate_gait
 

@@ -7,16 +7,19 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
-from poise.baselines.balance.stepping.planner import search_limits
-from poise.baselines.balance.stepping.planning.blocks import CaptureTick
-from poise.baselines.balance.stepping.planning.config import StepLimits
+from poise.baselines.balance.stepping.planning.blocks import (
+    CaptureTick,
+    Search,
+    StepGains,
+    SwingArrays,
+    zeros,
+)
+from poise.baselines.balance.stepping.planning.config import StepLimits, in_si
 from poise.baselines.balance.stepping.planning.swing import swing_gains, swing_task
 from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
 from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
-from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
@@ -27,9 +30,8 @@ from poise.envs.terrain.terrain import Surface, Terrain
 from .config import GaitConfig, WalkConfig
 from .controller import Commanded
 from .given import allocate_treads, given_footholds
-from .models.leg_rows import leg_task
 from .models.legs import leg_arrays, no_legs
-from .models.reference import allocate_reference
+from .models.reference import allocate_reference, leg_task
 from .planner.arms import allocate_arms
 from .planner.blocks import Gait, WalkTick
 from .planner.command import ENTRIES, GaitCommand
@@ -44,36 +46,16 @@ def allocate_gait(
 
     `limits` are what its legs can do of those of `config`; None: no step, no command is one then.
     """
-    c, h, omega = config, units.height, units.omega
-    whole = np.int64
+    numbers = in_si(Gait, config, units)
+    if limits is None:
+        numbers["speed_margin"] = np.inf
     return Gait(
-        step_time=c.step_time / omega,
-        transfer_time=c.transfer_time / omega,
-        width=c.width * h,
-        height=c.height * h,
-        acceleration=c.acceleration * h * omega**2,
-        turn_acceleration=c.turn_acceleration * omega**2,
-        correction=float(c.correction),
-        correction_limit=c.correction_limit * h * omega,
-        time_price=c.time_price * h * omega,
-        transfer_gain=float(c.transfer_gain),
-        start_radius=c.start_radius * h,
-        start_time=c.start_time / omega,
-        speed_margin=c.speed_margin * h * omega if limits else np.inf,
-        time_min=(limits or c.limits).time_min / omega,
-        lower=float(c.lower),
-        command=guarded_zeros(ENTRIES),
-        velocity=guarded_zeros(3),
-        error=guarded_zeros(2),
-        planned=guarded_zeros(2),
-        yaw=guarded_zeros(1),
-        walking=guarded_zeros(1, whole),
-        starting=guarded_zeros(1, whole),
-        clock=guarded_zeros(1),
-        cop=guarded_zeros(2),
-        middle=guarded_zeros(2),
-        step_clock=guarded_zeros(1),
-        treads=allocate_treads(config.treads, list(surfaces), h),
+        **numbers,
+        **in_si(Gait, limits or config.limits, units),
+        **zeros(command=ENTRIES, velocity=3, error=2, planned=2, yaw=1, cop=2, middle=2),
+        **zeros(clock=1, step_clock=1),
+        **zeros(np.int64, walking=1, starting=1),
+        treads=allocate_treads(config.treads, list(surfaces), units),
     )
 
 
@@ -107,6 +89,8 @@ class Walk(Commanded, CaptureStep):
     the CoM's height is that of the line through them then, whatever the gait's model. Raises
     ConfigError as `CaptureStep` does.
     """
+
+    kernel = staticmethod(walk_tick)
 
     def __init__(self, robot: Robot, config: WalkConfig | None = None):
         config = config or WalkConfig()
@@ -154,10 +138,9 @@ class Walk(Commanded, CaptureStep):
         limits = limits_of_legs(self.robot, self._gait_config)
         self.gait_limits = limits or self._gait_config.limits
         gait = allocate_gait(self._gait_config, self.robot.units, limits, given)
+        members = {item.name: getattr(self.gait, item.name) for item in fields(Gait)}
         kept: dict[str, Any] = {
-            name: each
-            for name, each in ((f.name, getattr(self.gait, f.name)) for f in fields(Gait))
-            if isinstance(each, np.ndarray)
+            name: each for name, each in members.items() if isinstance(each, np.ndarray)
         }
         self.gait, self._terrain, self._walk_tick = replace(gait, **kept), terrain, None
 
@@ -175,8 +158,8 @@ class Walk(Commanded, CaptureStep):
                 member[...] = 0
         self.gait.treads.leaning[:] = 0.0
 
-    def walk_tick(self, state: RobotState, targets: Targets) -> WalkTick:
-        """The block that the kernel `walk_tick` works on."""
+    def block(self, state: RobotState, targets: Targets) -> WalkTick:
+        """See `CaptureStep`."""
         return self.around(self.tick(state, targets))
 
     def around(self, capture: CaptureTick) -> WalkTick:
@@ -197,7 +180,7 @@ class Walk(Commanded, CaptureStep):
     def _of_gait(self, capture: CaptureTick) -> CaptureTick:
         """A block with the same memory, and the QPs, the swing and the limits of the gait."""
         gait, units = self._gait_config, self.robot.units
-        h, omega, task = units.height, units.omega, swing_gains(self.qp.arrays, gait.swing)
+        task = swing_gains(self.qp.arrays, gait.swing)
         asked, way, axes = capture.reference_out, self._swing.reference, self.memory.level_frame
         on_first, on_second, on_both = (
             self.gait_sets.sets[soles].bind(
@@ -207,32 +190,14 @@ class Walk(Commanded, CaptureStep):
             )
             for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
         )  # fmt: skip
-        gains = replace(
-            capture.gains,
-            leg_length=gait.leg_length * h,
-            root_accel=gait.root_accel * omega**2,
-            swing_accel=gait.swing_accel * omega**2,
-            joint_accel=gait.joint_accel * omega**2,
-        )
         swing = replace(
             capture.swing,
-            apex=gait.swing.clearance * h,
-            lift=gait.swing.lift,
-            landing_speed=gait.swing.landing_speed * h * omega,
+            **in_si(SwingArrays, gait.swing, units),
+            apex=gait.swing.clearance * units.height,
         )
         return replace(
-            capture, gains=gains, swing=swing,
-            search=replace(capture.search, **search_limits(self.gait_limits, units)),
+            capture, swing=swing,
+            gains=replace(capture.gains, **in_si(StepGains, gait, units)),
+            search=replace(capture.search, **in_si(Search, self.gait_limits, units)),
             on_first=on_first, on_second=on_second, on_both=on_both,
         )  # fmt: skip
-
-    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
-        tick = self.walk_tick(state, targets)
-        return address_of(walk_tick, tick), tick
-
-    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        tick = self.walk_tick(state, targets)
-        walk_tick(tick)
-        if tick.capture.to_python[0]:
-            return self.qp.torques(state, targets)
-        return self.tau[self._motors]

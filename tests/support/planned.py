@@ -1,4 +1,4 @@
-"""What the kernels of `StepPlanner` find, as values."""
+"""What the kernels of `StepPlanner`, `CopRegion` and `Swing` find, as values."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,10 @@ import numpy as np
 
 from poise.baselines.balance.stepping.planner import StepPlanner
 from poise.baselines.balance.stepping.planning.blocks import Search
+from poise.baselines.balance.stepping.planning.cop_region import CopRegion, distance_beyond
 from poise.baselines.balance.stepping.planning.search import plan_step, replan_step, set_foot
-from poise.baselines.balance.stepping.planning.swing import Swing
+from poise.baselines.balance.stepping.planning.swing import Swing, advance_over, aim_swing
+from poise.envs.compiled.maths.vectors import turn
 from poise.envs.physics.state import RobotState
 
 
@@ -51,6 +53,35 @@ def footholds(
         planner.foothold_rule(search)
         found[k], costs[k] = search.foothold, search.cost[0]
     return found, costs
+
+
+def alone(region: CopRegion, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
+    """(k, 2) The region of a sole alone at `point` (≥ 2,), turned by `yaw` [m]."""
+    return point[:2] + region.alone[sole] @ turn(yaw).T
+
+
+def beyond(
+    region: CopRegion, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
+) -> np.ndarray:
+    """(n,) How far points `xi` (n, 2) lie outside the region of both soles [m]; < 0 inside.
+
+    The soles are at `first` and `second`, (n, 2) or (2,).
+    """
+    rows = zip(*np.atleast_2d(*np.broadcast_arrays(first, second, xi)), strict=True)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.array([distance_beyond(region.arrays, *a, *b, cos, sin, *x) for a, b, x in rows])
+
+
+def aim(swing: Swing, foothold: np.ndarray, duration: float | None = None) -> None:
+    """Lead to another `foothold` (2,), or at another time, see `aim_swing`."""
+    duration = swing.duration if duration is None else duration
+    aim_swing(swing.arrays, float(foothold[0]), float(foothold[1]), float(duration))
+
+
+def advance(swing: Swing, dt: float) -> np.ndarray:
+    """(3, 3) Position, velocity and acceleration [m, s] after `dt` more seconds."""
+    advance_over(swing.arrays, swing.arrays.apex, dt)
+    return swing.reference.copy()
 
 
 def _along(planner: StepPlanner, state: RobotState, yaw: float) -> Search:

@@ -11,7 +11,7 @@ from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import LOADING, SHIFTING
 from poise.envs.compiled.maths.polygons import nearest_inside
 from poise.envs.compiled.maths.vectors import turn
-from tests.support.planned import StepPlan
+from tests.support.planned import StepPlan, alone
 
 FROZEN = 0.03
 
@@ -38,8 +38,8 @@ def quintic(start, end, duration, t):
 
 
 def advanced(swing, dt):
-    """(3, 3) what `Swing.advance` should give."""
-    rest, speed, w = swing.remaining, swing.landing_speed, swing.arrays
+    """(3, 3) what `planned.advance` should give."""
+    rest, speed, w = swing.remaining, swing.arrays.landing_speed, swing.arrays
     reference, ground = swing.reference.T, float(w.ground[0])
     ways = []
     for now, place in zip(reference[:2], swing.foothold, strict=True):
@@ -163,7 +163,7 @@ class ReadablePlanner:
         """Foothold (2,) of a step, and how far ξ will then be outside both soles' reach."""
         choice, h, R, side = self.choice, self.h, turn(yaw), self.planner.foot_sign[foot]
         stance, xi = state.sole_points[1 - foot, :2], state.capture_point
-        p = nearest_inside(self.region.one(1 - foot, stance, yaw), xi)
+        p = nearest_inside(alone(self.region, 1 - foot, stance, yaw), xi)
         end = drifted(xi, p, state.omega, time)
         local = R.T @ (end - stance) - self.region.middle[foot]
         local[0] += choice.sagittal_offset * h * np.tanh(local[0] / (0.1 * h))

@@ -86,12 +86,11 @@ class LIPMPC(Guided):
 
     def _build(self) -> None:
         n, c = self.config.steps, self.config
-        eye, capture = sparse.identity, np.ones(2)  # ξ = c + ċ/ω
+        eye, xi = sparse.identity, np.ones((2, 2))  # ξ² of [c; ċ/ω], ξ = c + ċ/ω
         change = sparse.diags([-np.ones(n - 1), np.ones(n - 1)], [0, 1], shape=(n - 1, n))
         P_cop = sparse.kron(eye(n) + c.change * change.T @ change, eye(2))
         weights = np.full(n, c.capture_point)
         weights[-1] += c.end
-        xi = np.outer(capture, capture)
         P_state = sparse.kron(sparse.diags(weights), sparse.kron(xi, eye(2)))
         P = 2.0 * sparse.block_diag([P_cop, P_state + 1e-9 * eye(4 * n)], format="csc")
         pendulum = sparse.kron(eye(n), sparse.kron(self.B[:, None], eye(2)))
@@ -126,10 +125,8 @@ class LIPMPC(Guided):
         """(steps, 2) the CoPs of the horizon [m]; where none is found the saturated ξ."""
         n, reference = self.config.steps, targets.com[:2]
         normals, offsets = half_planes(shrunk(state.support_polygon, self.config.share))
-        normals, offsets = (
-            normals[:MAX_EDGES],
-            offsets[:MAX_EDGES] - normals[:MAX_EDGES] @ reference,
-        )
+        normals = normals[:MAX_EDGES]
+        offsets = offsets[:MAX_EDGES] - normals @ reference
         missing = MAX_EDGES - len(offsets)
         normals = np.vstack([normals, np.repeat(normals[-1:], missing, axis=0)])
         offsets = np.concatenate([offsets, np.repeat(offsets[-1:], missing)])

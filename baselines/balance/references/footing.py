@@ -16,6 +16,7 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.maths.vectors import rotation_vector
 from poise.envs.robots.robot import Robot
 
+from .postures import sole_pose
 from .splines import evaluate, piecewise, rest_spline
 
 #: columns of `Footing.coeffs`: c, φ, place and turn of either sole, then δ
@@ -110,9 +111,7 @@ def sole_poses(robot: Robot, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
         data.qpos[:] = q
         mujoco.mj_kinematics(robot.model, data)
         mujoco.mj_comPos(robot.model, data)
-        axes = [data.xmat[sole.body_id].reshape(3, 3) for sole in robot.soles]
-        return [(data.xpos[sole.body_id] + R @ sole.position, R @ sole.rotation)
-                for sole, R in zip(robot.soles, axes, strict=True)]  # fmt: skip
+        return [sole_pose(data, sole) for sole in robot.soles]
 
     standing = put(robot.standing_qpos)
     ground = np.mean([point for point, _ in standing], axis=0) * [0.0, 0.0, 1.0]

@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 import scipy  # loads its parts when they are first asked for
 from scipy.linalg import solve_banded
@@ -10,10 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
+from poise.envs.physics.legs import standing_data
 from poise.envs.robots.robot import Robot
 
-from .footing import LIGHT, momentum_offset
+from .footing import LIGHT, momentum_offset, stances_of
 from .legs import PlantedLegs, bearing_polygon, nominal_feet
+from .postures import most_beyond
 from .splines import rest_spline
 
 SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
@@ -81,13 +82,13 @@ def plan_zmp(robot: Robot, plan: FootPlan, rest: np.ndarray) -> np.ndarray:
         turn = Rotation.from_rotvec(plan.turns[k, foot]).as_matrix()[:2, :2]
         return np.asarray(plan.places[k, foot, :2] + turn @ middles[foot])
 
-    both = plan.planted.all(axis=1)
+    both = np.asarray(plan.planted.all(axis=1))
     flies = np.asarray(~plan.planted.any(axis=1))
     out[flies] = plan.places[flies, :, :2].mean(axis=1) + rest
     for k in np.flatnonzero(~both & ~flies):
         out[k] = over(int(np.argmax(plan.planted[k])), int(k))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], both.astype(int), [0]])))
-    for a, b in edges.reshape(-1, 2):
+    for a, last in stances_of(both):
+        b = last + 1
         middle = plan.places[a, :, :2].mean(axis=0) + rest
         before = middle if a == 0 else out[a - 1]
         after = middle
@@ -124,12 +125,11 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     if len(plan.height) < 2.0 * LEAD / plan.dt + 2.0:
         raise ConfigError(f"lasts {len(plan.height) * plan.dt:.2f} s: too short for the weight to "
                           "shift", source=source, field="feet")  # fmt: skip
-    legs, ground = PlantedLegs(robot), float(nominal_feet(robot)[:, 2].mean())
-    standing = robot.standing_qpos
+    legs, feet = PlantedLegs(robot), nominal_feet(robot)
+    ground = float(feet[:, 2].mean())
     times = np.arange(len(plan.height)) * plan.dt
-    middle = nominal_feet(robot).mean(axis=0)
-    rest = _com(robot, standing)[:2] - middle[:2]
-    zmp = plan_zmp(robot, plan, rest)
+    standing = standing_data(robot).subtree_com[robot.root_body_id]
+    zmp = plan_zmp(robot, plan, standing[:2] - feet.mean(axis=0)[:2])
     vertical = rest_spline(times, plan.height[:, None])(times, 2)[:, 0]
     gravity = robot.units.gravity
     share = plan.height / np.maximum(gravity + vertical, FLOATS * gravity) / plan.dt**2
@@ -149,12 +149,10 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
             f"the limbs swing too fast: the ZMP is {100 * away.max():.1f} cm from where the soles "
             f"bear it at {times[int(np.argmax(away))]:.2f} s", source=source, field="feet",
         )  # fmt: skip
-    low, high = robot.joint_range.T
-    over = np.maximum(low - qpos[:, 7:], qpos[:, 7:] - high)
-    frame, joint = np.unravel_index(int(np.argmax(over)), over.shape)
-    if over[frame, joint] > 0.0:
+    frame, joint, beyond = most_beyond(robot, qpos[:, 7:])
+    if beyond > 0.0:
         raise ConfigError(
-            f"joint {robot.joint_names[joint]!r} would be {np.degrees(over[frame, joint]):.2g}° "
+            f"joint {robot.joint_names[joint]!r} would be {np.degrees(beyond):.2g}° "
             f"beyond its range at {times[frame]:.2f} s", source=source, field="feet",
         )  # fmt: skip
     return qpos
@@ -219,11 +217,3 @@ def _led(com: np.ndarray, frames: int) -> np.ndarray:
     out[: frames + 1] = com[0] + fade * (com[: frames + 1] - com[0])
     out[-frames - 1 :] = com[-1] + fade[::-1] * (com[-frames - 1 :] - com[-1])
     return out
-
-
-def _com(robot: Robot, qpos: np.ndarray) -> np.ndarray:
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(robot.model, data)
-    mujoco.mj_comPos(robot.model, data)
-    return np.array(data.subtree_com[robot.root_body_id])

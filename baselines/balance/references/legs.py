@@ -1,15 +1,17 @@
 """Postures with a given centre of mass, trunk and arms whose legs reach the soles."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from poise.envs.compiled.maths.polygons import clipped
+from poise.envs.physics.legs import standing_data
 from poise.envs.robots.robot import Robot
 
-from .postures import LevelKinematics
+from .postures import LevelKinematics, sole_pose
 
 MOST, CLOSE = 15, 1e-7  # iterations, and the error [m, rad] that ends them
 FURTHEST = 0.3  # [m, rad] of a step
@@ -23,24 +25,20 @@ class PlantedLegs:
     Attributes:
         legs: (k,) entries of q that move one sole and not the other.
         others: (nj − k,) the other joints.
+        standing_soles: points and axes of the soles in standing, see `sole_pose`.
     """
 
     def __init__(self, robot: Robot):
-        self.robot, self._data = robot, mujoco.MjData(robot.model)
+        self.robot, self._data = robot, standing_data(robot)
         self._standing = LevelKinematics(robot).standing
-        self._data.qpos[:] = robot.standing_qpos
-        mujoco.mj_kinematics(robot.model, self._data)
-        mujoco.mj_comPos(robot.model, self._data)
         dofs = _leg_dofs(robot, self._data)
         self.legs = dofs - 6
         self.others = np.setdiff1d(np.arange(len(robot.joint_names)), self.legs)
-        self.standing_soles = [self._sole(i) for i in range(len(robot.soles))]  #: points and axes
+        self.standing_soles = [sole_pose(self._data, sole) for sole in robot.soles]
         self._middle = np.mean([point for point, _ in self.standing_soles], axis=0)
         self._free = np.array([0, 1, 2, *dofs])
         self._away, self._upright = np.zeros(3), np.zeros(4)  # of the root from the CoM, of late
-        mujoco.mju_mat2Quat(
-            self._upright, np.ascontiguousarray(self._standing.root_axes).ravel()
-        )  # fmt: skip
+        mujoco.mju_mat2Quat(self._upright, self._standing.root_axes.ravel())
 
     def reach(
         self, com: np.ndarray, root: np.ndarray, others: np.ndarray, guess: np.ndarray
@@ -105,7 +103,7 @@ class PlantedLegs:
         error[:3] = data.subtree_com[robot.root_body_id] - com
         mujoco.mj_jacSubtreeCom(model, data, jacobian[:3], robot.root_body_id)
         for i, (wanted, wanted_axes) in enumerate(soles):
-            point, axes = self._sole(i)
+            point, axes = sole_pose(data, robot.soles[i])
             at = 3 + 6 * i
             error[at : at + 3] = point - wanted
             mujoco.mju_mat2Quat(quaternion, (axes @ wanted_axes.T).ravel())
@@ -113,11 +111,6 @@ class PlantedLegs:
             mujoco.mj_jac(model, data, jacobian[at : at + 3], jacobian[at + 3 : at + 6], point,
                           robot.soles[i].body_id)  # fmt: skip
         return error, jacobian
-
-    def _sole(self, foot: int) -> tuple[np.ndarray, np.ndarray]:
-        sole = self.robot.soles[foot]
-        axes = self._data.xmat[sole.body_id].reshape(3, 3)
-        return self._data.xpos[sole.body_id] + axes @ sole.position, axes @ sole.rotation
 
 
 def _leg_dofs(robot: Robot, data: mujoco.MjData) -> np.ndarray:
@@ -131,12 +124,8 @@ def _leg_dofs(robot: Robot, data: mujoco.MjData) -> np.ndarray:
 
 def nominal_feet(robot: Robot) -> np.ndarray:
     """(2, 3) middles of the soles in the standing posture, which faces along x [m]."""
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(robot.model, data)
-    feet = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position
-            for s in robot.soles]  # fmt: skip
-    return np.array(feet)
+    data = standing_data(robot)
+    return np.array([sole_pose(data, sole)[0] for sole in robot.soles])
 
 
 def foot_signs(robot: Robot) -> np.ndarray:
@@ -146,27 +135,18 @@ def foot_signs(robot: Robot) -> np.ndarray:
     return np.array([sign, -sign])
 
 
-AnkleLimits = tuple[np.ndarray, np.ndarray, np.ndarray]  # as `ankle_limits` returns them
-
-
-def ankle_limits(robot: Robot, sole: int) -> AnkleLimits:
+@lru_cache(maxsize=16)
+def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """N (k, 2), o (k,), b (k,): |N p − o| ≤ b/λ for a CoP p [m, sole frame] under a load of λ m g.
 
     One row for each motor joint of the foot itself: the moment of a vertical force about its axis
     in the standing posture, over its torque limit.
     """
     model, foot = robot.model, robot.soles[sole]
-    data = mujoco.MjData(model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(model, data)
-    body = foot.body_id
-    R = data.xmat[body].reshape(3, 3) @ foot.rotation
-    point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot.position
-    weight = robot.units.force
+    data = standing_data(robot)
+    point, R = sole_pose(data, foot)
     normals, offsets, bounds = [], [], []
-    for joint in range(model.njnt):
-        if model.jnt_bodyid[joint] != body:
-            continue
+    for joint in np.flatnonzero(model.jnt_bodyid == foot.body_id):
         motor = np.flatnonzero(robot.motor_dofs == model.jnt_dofadr[joint])
         if len(motor) == 0:
             continue
@@ -174,20 +154,17 @@ def ankle_limits(robot: Robot, sole: int) -> AnkleLimits:
         # (axis × (point + R p − anchor))_z, affine in p
         offsets.append(-np.cross(axis, point - anchor)[2])
         normals.append([np.cross(axis, R[:, a])[2] for a in range(2)])
-        bounds.append(robot.torque_limit[motor[0]] / weight)
+        bounds.append(robot.torque_limit[motor[0]] / robot.units.force)
     return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
 
 
-def bearing_polygon(
-    robot: Robot, sole: int, load: float, fraction: float, limits: AnkleLimits | None = None
-) -> np.ndarray:
+def bearing_polygon(robot: Robot, sole: int, load: float, fraction: float) -> np.ndarray:
     """(k, 2) where a sole under a `load` [m g] can have its CoP, in its own frame [m].
 
-    Only `fraction` of the polygon and of the ankles' torques counts. `limits` are those of
-    `ankle_limits`, for whoever asks about many loads.
+    Only `fraction` of the polygon and of the ankles' torques counts.
     """
     polygon = fraction * robot.soles[sole].polygon
-    for normal, offset, bound in zip(*(limits or ankle_limits(robot, sole)), strict=True):
+    for normal, offset, bound in zip(*ankle_limits(robot, sole), strict=True):
         room = fraction * bound / max(load, 1e-3)
         polygon = clipped(polygon, normal, offset + room)
         polygon = clipped(polygon, -normal, room - offset)

@@ -21,16 +21,9 @@ from poise.envs.robots.robot import Robot
 
 from .foot_steps import FootStep, check_steps, plan_steps
 from .footwork import perform_plan
-from .postures import LevelKinematics
+from .postures import LevelKinematics, most_beyond
 from .reference_motion import ReferenceMotion
-from .robot_clip import (
-    RATE,
-    About,
-    RobotClip,
-    read_robot_clip,
-    reference_from,
-    stepped_reference,
-)
+from .robot_clip import RATE, About, RobotClip, read_robot_clip, reference_from, stepped_reference
 from .splines import piecewise, rest_spline
 
 SAMPLING = 0.02  # [s] between the postures whose height and root orientation are computed
@@ -173,9 +166,16 @@ def _key_curves(
 ) -> tuple[np.ndarray, BSpline | PPoly, BSpline | PPoly]:
     """Times (n,) of the keyframes [s], and the curves of joints and CoM through them."""
     com = np.array([key.com for key in description.keyframes])
+    extent = kinematics.support_extent()
     if description.com_unit == "fraction":
-        com = com * kinematics.support_extent()
-    _check_com(com, kinematics.support_extent(), source)
+        com = com * extent
+    for i, offset in enumerate(com):
+        if np.any(np.abs(offset) >= extent):
+            raise ConfigError(
+                f"{offset.round(3)} m is not inside the soles, which reach ±{extent.round(3)} m",
+                source=source,
+                field=f"keyframes[{i}].com",
+            )
     postures = np.array([_posture(key.roles, robot, source) for key in description.keyframes])
     for i, offset in enumerate(com):
         postures[i] = _balanced(postures[i], offset, description.balance, robot, kinematics, source)
@@ -186,17 +186,11 @@ def _key_curves(
     standing = robot.standing_qpos[7:]
     keys = description.keyframes
     rates = [_posture(key.rates, robot, source, "rates") - standing for key in keys]
-    return times, *_curves(description.interpolation, times, postures, com, np.array(rates))
-
-
-def _curves(
-    kind: Interpolation, times: np.ndarray, joints: np.ndarray, com: np.ndarray, rates: np.ndarray
-) -> tuple[BSpline | PPoly, BSpline | PPoly]:
-    """Curves of joints (n, nj) and CoM (n, 2); the CoM has no rates of its own."""
+    kind = description.interpolation
     if kind == "rest":
-        return rest_spline(times, joints), rest_spline(times, com)
-    given = rates if kind == "hermite" and len(rates) == len(times) else None
-    return curve_through(kind, times, joints, given), curve_through(kind, times, com)
+        return times, rest_spline(times, postures), rest_spline(times, com)
+    given = np.array(rates) if kind == "hermite" and len(rates) == len(times) else None
+    return times, curve_through(kind, times, postures, given), curve_through(kind, times, com)
 
 
 def _posture(
@@ -250,24 +244,13 @@ def _balanced(
     )
 
 
-def _check_com(com: np.ndarray, extent: np.ndarray, source: str) -> None:
-    for i, offset in enumerate(com):
-        if np.any(np.abs(offset) >= extent):
-            raise ConfigError(
-                f"{offset.round(3)} m is not inside the soles, which reach ±{extent.round(3)} m",
-                source=source,
-                field=f"keyframes[{i}].com",
-            )
-
-
 def _check_range(times: np.ndarray, postures: np.ndarray, robot: Robot, source: str) -> None:
-    low, high = robot.joint_range.T
-    outside = np.maximum(low - postures, postures - high)
-    i, j = np.unravel_index(np.argmax(outside), outside.shape)
-    if outside[i, j] > 1e-9:
+    i, j, beyond = most_beyond(robot, postures)
+    if beyond > 1e-9:
+        low, high = robot.joint_range[j]
         raise ConfigError(
             f"joint {robot.joint_names[j]!r} would be at {postures[i, j]:.3f} at {times[i]:.2f} s, "
-            f"outside its range [{low[j]:.3f}, {high[j]:.3f}]",
+            f"outside its range [{low:.3f}, {high:.3f}]",
             source=source,
             field="keyframes",
         )

@@ -1,4 +1,4 @@
-"""The centre of mass and the root of a posture whose soles are on the ground."""
+"""Where soles, centre of mass and root of a posture are; whether its joints are in their range."""
 
 from typing import NamedTuple
 
@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.envs.compiled.copies import Copyable
 from poise.envs.robots.robot import Robot
+from poise.envs.robots.soles import Sole
 
 
 class LevelPosture(NamedTuple):
@@ -15,6 +16,21 @@ class LevelPosture(NamedTuple):
 
     com: np.ndarray  # (3,) [m]
     root_axes: np.ndarray  # (3, 3) root orientation
+
+
+def sole_pose(data: mujoco.MjData, sole: Sole) -> tuple[np.ndarray, np.ndarray]:
+    """Point (3,) [m] and axes (3, 3) of a sole in the world, where `data` has its foot."""
+    axes = data.xmat[sole.body_id].reshape(3, 3)
+    return data.xpos[sole.body_id] + axes @ sole.position, axes @ sole.rotation
+
+
+def most_beyond(robot: Robot, joints: np.ndarray) -> tuple[int, int, float]:
+    """Frame and joint of postures (F, nj) that is furthest beyond its range, and by how much; not
+    above 0 where all are within."""
+    low, high = robot.joint_range.T
+    beyond = np.maximum(low - joints, joints - high)
+    frame, joint = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    return int(frame), int(joint), float(beyond[frame, joint])
 
 
 class LevelKinematics(Copyable):
@@ -40,11 +56,10 @@ class LevelKinematics(Copyable):
         mujoco.mj_comPos(robot.model, data)
         origin, forward, up = np.zeros(3), np.zeros(3), np.zeros(3)
         for sole in robot.soles:
-            foot_axes = data.xmat[sole.body_id].reshape(3, 3)
-            sole_axes = foot_axes @ sole.rotation
-            origin += (data.xpos[sole.body_id] + foot_axes @ sole.position) / len(robot.soles)
-            forward += sole_axes[:, 0]
-            up += sole_axes[:, 2]
+            point, axes = sole_pose(data, sole)
+            origin += point / len(robot.soles)
+            forward += axes[:, 0]
+            up += axes[:, 2]
         up /= np.linalg.norm(up)
         left = _cross(up, forward)
         left /= np.linalg.norm(left)

@@ -17,7 +17,7 @@ from poise.configs.schema import build
 from poise.envs.robots.robot import Robot
 
 from .footing import check_planted, make_footing, sole_poses
-from .postures import LevelKinematics
+from .postures import LevelKinematics, most_beyond, sole_pose
 from .reference_motion import ReferenceMotion, check_commands, whole_walk
 from .splines import piecewise, rest_spline
 
@@ -221,24 +221,19 @@ def stepped_reference(
 
 
 def _check_range(joints: np.ndarray, robot: Robot, source: str) -> None:
-    outside = np.maximum(robot.joint_range[:, 0] - joints, joints - robot.joint_range[:, 1])
-    frame, joint = np.unravel_index(np.argmax(outside), outside.shape)
-    if outside[frame, joint] > 1e-6:
+    frame, joint, beyond = most_beyond(robot, joints)
+    if beyond > 1e-6:
         raise ConfigError(
-            f"joint {robot.joint_names[joint]!r} is {outside[frame, joint]:.3g} beyond its range "
+            f"joint {robot.joint_names[joint]!r} is {beyond:.3g} beyond its range "
             f"in frame {frame}", source=source, field="qpos",
         )  # fmt: skip
 
 
 def _check_level(kinematics: LevelKinematics, time: float, source: str) -> None:
     """Raise ConfigError if the soles of the last posture are not level with each other."""
-    robot, data = kinematics.robot, kinematics.data
-    first, second = (
-        (data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position,
-         data.xmat[s.body_id].reshape(3, 3) @ s.rotation[:, 2])
-        for s in robot.soles
-    )  # fmt: skip
-    gap = abs(float((second[0] - first[0]) @ (first[1] + second[1]) / 2.0))
+    soles = [sole_pose(kinematics.data, sole) for sole in kinematics.robot.soles]
+    (first, first_axes), (second, second_axes) = soles
+    gap = abs(float((second - first) @ (first_axes + second_axes)[:, 2] / 2.0))
     if gap > LEVEL:
         raise ConfigError(
             f"at {time:.2f} s one sole is {100 * gap:.1f} cm above the other: both must stay on "

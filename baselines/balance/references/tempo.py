@@ -1,6 +1,6 @@
 """How fast a motion's time runs: it may wait while the robot catches itself."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -68,15 +68,8 @@ class Pace(Block):
 
 def make_pace(tempo: Tempo, height: float) -> Pace:
     """The pace of a motion that has not begun; `height` [m] is h."""
-    pace = Pace(
-        waits=tempo.waits,
-        distance=tempo.distance * height,
-        lag=tempo.lag,
-        least=tempo.least,
-        after=AFTER.index(tempo.after),
-        fastest=tempo.fastest,
-        memory=guarded_zeros(5),
-    )
+    own = {"distance": tempo.distance * height, "after": AFTER.index(tempo.after)}
+    pace = Pace(**(asdict(tempo) | own), memory=guarded_zeros(5))
     pace.clear()
     return pace
 

@@ -1,6 +1,8 @@
 """Feet in place as long as that holds; then steps to where the capture point can be stopped."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +23,8 @@ from poise.envs.robots.robot import Robot
 
 from .controller import STANDING, Stepping, SteppingController
 from .planner import StepPlanner
-from .planning.blocks import CaptureTick, RegionArrays, StepGains, StepMemory
-from .planning.config import CaptureStepConfig, StepLimits
+from .planning.blocks import CaptureTick, RegionArrays, StepGains, StepMemory, zeros
+from .planning.config import CaptureStepConfig, StepLimits, in_si
 from .planning.cop_region import CopRegion, rest_ahead
 from .planning.recentring import recentring_arrays, stop_recentring
 from .planning.swing import Swing, swing_gains, swing_task
@@ -63,45 +65,19 @@ def step_gains(
 
     `rest_ahead` [m] as of `StepGains`; without `steps` no fall is a reason for one.
     """
-    c, units = config, robot.units
-    h, omega = units.height, units.omega
-    return StepGains(
-        step_margin=c.step_margin * h if steps else np.inf,
-        crouch_margin=c.crouch_margin,
-        turn_limit=float(np.radians(c.turn_limit)),
-        momentum_gain=c.momentum_gain * omega / units.force,
-        restep_margin=c.restep_margin * h,
-        gain=float(c.gain),
-        cop_overreach=c.cop_overreach * h,
-        leg_length=c.leg_length * h,
-        swing_com_drop=c.swing_com_drop * h,
-        load_time=c.load_time / omega,
-        unload_time=c.unload_time / omega,
-        double_support_time=c.double_support_time / omega,
-        root_accel=c.root_accel * omega**2,
-        swing_accel=c.swing_accel * omega**2,
-        joint_accel=c.joint_accel * omega**2,
-        rest_ahead=rest_ahead,
-        period=period,
-    )
+    numbers = in_si(StepGains, config, robot.units)
+    if not steps:
+        numbers["step_margin"] = np.inf
+    return StepGains(**numbers, rest_ahead=rest_ahead, period=period)
 
 
 def allocate_step_memory(region: RegionArrays) -> StepMemory:
     """The memory of a controller that has not stepped."""
-    corners, whole = region.sums.shape[0] * region.sums.shape[1], np.int64
+    corners = region.sums.shape[0] * region.sums.shape[1]
     return StepMemory(
-        steps=guarded_zeros(1, whole),
-        recovering=guarded_zeros(1, whole),
-        foot=guarded_zeros(1, whole),
-        swinging=guarded_zeros(1, whole),
-        level_frame=guarded_zeros((3, 3)),
-        clock=guarded_zeros(1),
-        load=guarded_zeros(1),
-        load_fraction=guarded_zeros(1),
-        region=guarded_zeros((2 * corners + 1, 2)),
-        corners=guarded_zeros(1, whole),
-        moved=guarded_zeros(1, whole),
-        return_fraction=guarded_zeros(1),
+        **zeros(np.int64, steps=1, recovering=1, foot=1, swinging=1, corners=1, moved=1),
+        **zeros(level_frame=(3, 3), region=(2 * corners + 1, 2)),
+        **zeros(clock=1, load=1, load_fraction=1, return_fraction=1),
     )
 
 
@@ -116,6 +92,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     they are bound to `config` and `planner` when they are made. Raises ConfigError unless there are
     two soles, and both QPs have a hard root and one period.
     """
+
+    kernel: Callable[[Any], None] = staticmethod(capture_tick)  #: that a tick runs
 
     def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
         if len(robot.soles) != 2:
@@ -136,9 +114,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self._swing = Swing(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)
         self.memory = allocate_step_memory(self.region.arrays)
-        self.tau = guarded_zeros(
-            len(self.qp.parameters.torque_limit)
-        )  #: (nv−6,) of the last tick [N·m]
+        #: (nv−6,) of the last tick [N·m]
+        self.tau = guarded_zeros(len(self.qp.parameters.torque_limit))
         self._vdot = guarded_zeros(robot.model.nv)
         self._failures = guarded_zeros(1, dtype=np.int64)
         self._motors = self.qp.arrays.motor_dofs - 6
@@ -282,24 +259,25 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             tau=self.tau,
             vdot=self._vdot,
             failures=self._failures,
-            to_python=guarded_zeros(1, dtype=np.int64),
-            corners=guarded_zeros(region.alone.shape[1:]),
-            cloud=guarded_zeros((len(self.memory.region) // 2, 2)),
-            pair=guarded_zeros(2),
-            vector=guarded_zeros(3),
+            **zeros(np.int64, to_python=1),
+            **zeros(corners=region.alone.shape[1:], cloud=(len(self.memory.region) // 2, 2)),
+            **zeros(pair=2, vector=3),
             standing_kernel=NO_KERNEL,
             contact_kernel=NO_KERNEL,
         )
 
+    def block(self, state: RobotState, targets: Targets) -> Block:
+        """The block that `kernel` works on."""
+        return self.tick(state, targets)
+
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
         """Return the kernel that compiled code calls instead of `torques`, and its block."""
-        tick = self.tick(state, targets)
-        return address_of(capture_tick, tick), tick
+        block = self.block(state, targets)
+        return address_of(self.kernel, block), block
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
-        tick = self.tick(state, targets)
-        capture_tick(tick)
-        if tick.to_python[0]:
+        self.kernel(self.block(state, targets))
+        if self.tick(state, targets).to_python[0]:
             return self.qp.torques(state, targets)
         return self.tau[self._motors]

@@ -4,16 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import (
-    COM_X,
-    COM_Z,
-    COP_X,
-    FOOTHOLD_X,
-    LEAN_X,
-    NAMES,
-    TIME,
-    TRIGGER,
-)
+from poise.baselines.balance.references import targets
 from poise.baselines.controller import BaseController
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
@@ -21,22 +12,15 @@ from poise.envs.compiled.memory import guarded_zeros
 from .planning.config import StepLimits
 
 
-def _entry(first: int, doc: str) -> property:
-    def get(offsets: "StepOffsets") -> float:
-        return float(offsets.values[first])
+def _offset(first: int, count: int, doc: str) -> property:
+    """Entries of `StepOffsets.values`; of one alone the number."""
+    own = slice(first, first + count)
 
-    def put(offsets: "StepOffsets", value: float) -> None:
-        offsets.values[first] = value
+    def get(offsets: "StepOffsets") -> np.ndarray | float:
+        return offsets.values[own] if count > 1 else float(offsets.values[first])
 
-    return property(get, put, doc=doc)
-
-
-def _pair(first: int, doc: str) -> property:
-    def get(offsets: "StepOffsets") -> np.ndarray:
-        return offsets.values[first : first + 2]
-
-    def put(offsets: "StepOffsets", value: np.ndarray) -> None:
-        offsets.values[first : first + 2] = value
+    def put(offsets: "StepOffsets", value: np.ndarray | float) -> None:
+        offsets.values[own] = value
 
     return property(get, put, doc=doc)
 
@@ -44,19 +28,21 @@ def _pair(first: int, doc: str) -> property:
 class StepOffsets(Copyable):
     """The offsets that a policy adds to a stepping controller's choices, in axes of the heading.
 
-    Zeros add nothing. The order of `values` is that of `motions/offsets.py`.
+    Zeros add nothing. The order of `values` is that of `NAMES` in `references/targets.py`.
     """
 
-    com = _pair(COM_X, "(2,) The place where the capture point is to rest [m].")
-    cop = _pair(COP_X, "(2,) The CoP [m].")
-    height = _entry(COM_Z, "The height of the CoM [m].")
-    lean = _pair(LEAN_X, "(2,) The lean of the root about x and y [rad].")
-    foothold = _pair(FOOTHOLD_X, "(2,) The foothold [m].")
-    time = _entry(TIME, "The time from lift-off to touchdown [s].")
-    trigger = _entry(TRIGGER, "How much further the capture point may leave before a step [m].")
+    com = _offset(targets.COM_X, 2, "(2,) The place where the capture point is to rest [m].")
+    cop = _offset(targets.COP_X, 2, "(2,) The CoP [m].")
+    height = _offset(targets.COM_Z, 1, "The height of the CoM [m].")
+    lean = _offset(targets.LEAN_X, 2, "(2,) The lean of the root about x and y [rad].")
+    foothold = _offset(targets.FOOTHOLD_X, 2, "(2,) The foothold [m].")
+    time = _offset(targets.TIME, 1, "The time from lift-off to touchdown [s].")
+    trigger = _offset(
+        targets.TRIGGER, 1, "How much further the capture point may leave before a step [m]."
+    )
 
     def __init__(self) -> None:
-        self.values = guarded_zeros(len(NAMES))  #: (13,) all of them, for compiled code
+        self.values = guarded_zeros(len(targets.NAMES))  #: (13,) all of them, for compiled code
 
     def clear(self) -> None:
         """Set all to zero."""

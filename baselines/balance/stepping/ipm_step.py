@@ -1,7 +1,5 @@
 """Steps to where an inverted pendulum comes to rest upright, by its energy."""
 
-from typing import Any
-
 import numpy as np
 
 from poise.envs.compiled.jit import compiled
@@ -40,7 +38,7 @@ def energy_foothold(q: Search) -> None:
     x -= q.region.middle[foot, 0]
     y += q.foot_sign[foot] * q.lateral_offset - q.region.middle[foot, 1]
     x, y = with_offsets(q, x, y)
-    near_x, near_y = clip_to_limits(q, x, y)
+    near_x, near_y = clip_to_limits(q, x, y, q.width_min)
     q.foothold[0], q.foothold[1] = to_world(q, near_x, near_y)
     q.cost[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
 
@@ -53,10 +51,6 @@ class EnergyPlanner(StepPlanner):
     """
 
     foothold_rule = staticmethod(energy_foothold)
-
-    def __init__(self, *arguments: Any, arc: float = 0.0):
-        super().__init__(*arguments)  # those of a `StepPlanner`
-        self.arc = arc
 
 
 class IPMStep(CaptureStep):

@@ -2,52 +2,28 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypedDict
 
 import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
 from poise.envs.compiled.calls import NO_KERNEL, address_of
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.maths.pendulum import Units
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .controller import StepOffsets
-from .planning.blocks import Search
-from .planning.config import FallFeedback, FootholdChoice, PivotConfig, StepFeedback, StepLimits
+from .planning.blocks import Search, zeros
+from .planning.config import (
+    FallFeedback,
+    FootholdChoice,
+    PivotConfig,
+    StepFeedback,
+    StepLimits,
+    in_si,
+)
 from .planning.cop_region import CopRegion
 from .planning.feedback import feedback_arrays
 from .planning.search import capture_foothold
-
-
-class SearchLimits(TypedDict):
-    """`StepLimits` in SI units, as a `Search` has them [m, m/s, s]."""
-
-    ahead: float
-    behind: float
-    width_min: float
-    width_max: float
-    speed: float
-    side_speed: float
-    time_min: float
-    time_max: float
-
-
-def search_limits(limits: StepLimits, units: Units) -> SearchLimits:
-    """The limits of steps of a robot with these units."""
-    h, omega = units.height, units.omega
-    return {
-        "ahead": limits.ahead * h,
-        "behind": limits.behind * h,
-        "width_min": limits.width_min * h,
-        "width_max": limits.width_max * h,
-        "speed": limits.speed * h * omega,
-        "side_speed": limits.side_speed * h * omega,
-        "time_min": limits.time_min / omega,
-        "time_max": limits.time_max / omega,
-    }
 
 
 class StepPlanner(Copyable):
@@ -59,7 +35,6 @@ class StepPlanner(Copyable):
 
     #: finds the foothold of a foot and time
     foothold_rule: Callable[[Search], None] = staticmethod(capture_foothold)
-    arc = 0.0
 
     def __init__(
         self,
@@ -70,8 +45,9 @@ class StepPlanner(Copyable):
         feedback: StepFeedback | None = None,
         falls: Mapping[str, FallFeedback] | None = None,
         pivot: PivotConfig | None = None,
+        arc: float = 0.0,
     ):
-        self.region, self.limits, self.choice = region, limits, choice
+        self.region, self.limits, self.choice, self.arc = region, limits, choice, arc
         self.units = robot.units
         self.foot_sign = foot_signs(robot)
         self.offsets = StepOffsets()  #: what a policy adds
@@ -83,37 +59,22 @@ class StepPlanner(Copyable):
     def search(self, state: RobotState) -> Search:
         """The block that the kernels of `search.py` work on."""
         if self._search is None or self._search.state is not state.arrays:
-            search = self._allocate(state)
+            region = self.region.arrays
+            search = Search(
+                state=state.arrays,
+                region=region,
+                offsets=self.offsets.values,
+                feedback=self.feedback,
+                foot_sign=self.foot_sign,
+                height=self.units.height,
+                **in_si(Search, self.limits, self.units),
+                **in_si(Search, self.choice, self.units),
+                arc=float(self.arc),
+                **zeros(heading=2, capture_point=2, cop=2, start=2, time=1, foothold=2, cost=1),
+                **zeros(corners=region.alone.shape[1:], best=5),
+                **zeros(np.int64, foot=1, best_foot=1),
+                foothold_rule=NO_KERNEL,
+            )
             rule = address_of(self.foothold_rule, search)
             self._search = replace(search, foothold_rule=rule)
         return self._search
-
-    def _allocate(self, state: RobotState) -> Search:
-        choice, region = self.choice, self.region.arrays
-        h, omega = self.units.height, self.units.omega
-        return Search(
-            state=state.arrays,
-            region=region,
-            offsets=self.offsets.values,
-            feedback=self.feedback,
-            heading=guarded_zeros(2),
-            foot_sign=self.foot_sign,
-            height=h,
-            **search_limits(self.limits, self.units),
-            sagittal_offset=choice.sagittal_offset * h,
-            lateral_offset=choice.lateral_offset * h,
-            margin=choice.margin * h,
-            time_price=choice.time_price * h * omega,
-            arc=float(self.arc),
-            capture_point=guarded_zeros(2),
-            corners=guarded_zeros(region.alone.shape[1:]),
-            cop=guarded_zeros(2),
-            start=guarded_zeros(2),
-            foot=guarded_zeros(1, dtype=np.int64),
-            time=guarded_zeros(1),
-            foothold=guarded_zeros(2),
-            cost=guarded_zeros(1),
-            best=guarded_zeros(5),
-            best_foot=guarded_zeros(1, dtype=np.int64),
-            foothold_rule=NO_KERNEL,
-        )

@@ -36,7 +36,7 @@ from .planning.recentring import (
     stop_recentring,
 )
 from .planning.search import plan_step, replan_step, set_capture_point
-from .planning.swing import FROZEN, LANDING, advance_swing, aim_swing, start_swing, time_left
+from .planning.swing import FROZEN, LANDING, advance_over, aim_swing, start_swing, time_left
 
 LEAD = 0.7  # [1/ω] by which the turn of the root is looked ahead; in a crouch by less
 DEEP = 0.1  # [h] of a crouch in which it is not
@@ -51,23 +51,23 @@ def must_step(t: CaptureTick) -> bool:
     """Return whether ξ is so far outside the CoP region of both soles that a step begins.
 
     `CaptureStepConfig` has the distance."""
-    s, m, g, feet = t.state, t.memory, t.gains, t.state.sole_point
-    stepped = m.recovering[0] > 0
-    if stepped and m.clock[0] < g.double_support_time:
-        return False
-    cos, sin = s.heading[0], s.heading[1]
-    if stepped:
-        cos, sin = m.level_frame[0, 0], m.level_frame[1, 0]
-    x, y = s.capture_point[0], s.capture_point[1]
-    if stepped:
-        t.search.heading[0], t.search.heading[1] = cos, sin
-        set_capture_point(t.search)
-        x, y = t.search.capture_point[0], t.search.capture_point[1]
-    outside = distance_beyond(
-        t.search.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
-    )
-    if stepped:
+    s, m, g, q, feet = t.state, t.memory, t.gains, t.search, t.state.sole_point
+    if m.recovering[0] > 0:
+        if m.clock[0] < g.double_support_time:
+            return False
+        q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
+        set_capture_point(q)
+        x, y = q.capture_point[0], q.capture_point[1]
+        cos, sin = q.heading[0], q.heading[1]
+        outside = distance_beyond(
+            q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
+        )
         return outside > g.restep_margin + t.offsets[TRIGGER]
+    x, y = s.capture_point[0], s.capture_point[1]
+    cos, sin = s.heading[0], s.heading[1]
+    outside = distance_beyond(
+        q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
+    )
     x, y = x - s.origin[0], y - s.origin[1]  # of the fall
     turning = (x * s.momentum[LY] - y * s.momentum[LX]) / max(np.sqrt(x * x + y * y), 1e-9)
     margin = g.step_margin
@@ -163,7 +163,7 @@ def swing_tick(t: CaptureTick) -> None:
         limit_load(t, m.load_fraction[0] * max(m.load[0], 0.0))
         solve_contacts(t, t.on_both)
         return
-    advance_swing(w, g.period)
+    advance_over(w, w.apex, g.period)
     contacts = t.on_second if foot == 0 else t.on_first
     contacts.limited[0] = 0
     solve_contacts(t, contacts)

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from poise.baselines.whole_body.tasks.task import BoundTask, Task, TaskTick
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
@@ -162,3 +163,37 @@ def share_load(r: Reference, leg: int, fraction: float, duration: float) -> None
     for i, sign in ((leg, 1.0), (1 - leg, -1.0)):
         r.share[0, i] = w if i == leg else 1.0 - w
         r.share[1, i], r.share[2, i] = sign * rate, sign * accel
+
+
+@dataclass(frozen=True, eq=False)
+class LegRowsBlock(Block):
+    """A leg, and the reference whose answers its rows are."""
+
+    leg: int
+    reference: Reference
+
+
+@compiled
+def fill_leg_rows(t: TaskTick[LegRowsBlock]) -> None:
+    """The rows of a leg, see `LegRows`."""
+    leg, r, rows = t.task.leg, t.task.reference, t.rows
+    rows.A[0, r.legs.knee_dof[leg]] = r.legs.knee_sign[leg]
+    rows.A[1, r.legs.hip_dof[leg]] = r.legs.hip_sign[leg]
+    rows.b[0], rows.weights[0] = r.knee[leg, 0], r.knee[leg, 1]
+    rows.b[1], rows.weights[1] = r.hip[leg, 0], r.hip[leg, 1]
+
+
+@dataclass(frozen=True)
+class LegRows(Task[LegRowsBlock]):
+    """± q̈_knee = β̈ and ± q̈_hip = φ̈ of a stance leg [Zhao, OBJ2].
+
+    It has no `kind`: its accelerations and weights come from a reference model.
+    """
+
+    size: ClassVar[int] = 2
+    kernel = staticmethod(fill_leg_rows)
+
+
+def leg_task(leg: int, reference: Reference) -> BoundTask:
+    """The task of the QP for one leg."""
+    return BoundTask(LegRows(), LegRowsBlock(leg, reference))

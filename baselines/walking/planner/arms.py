@@ -60,16 +60,12 @@ def allocate_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Ar
 
 def largest_swing(robot: Robot) -> float:
     """The largest turn of both arms to either side that the joints' ranges allow [rad]."""
-    scales, model = arm_scales(robot), robot.model
-    joints = [model.joint(name) for name in robot.joint_names]
-    most = np.inf
-    for j, joint in enumerate(joints):
-        scale = np.abs(scales[:, j]).max()
-        if scale > 0.0 and model.jnt_limited[joint.id]:
-            low, high = joint.range
-            start = robot.standing_qpos[7 + j]
-            most = min(most, (high - start) / scale, (start - low) / scale)
-    return float(max(most, 0.0))
+    scales = np.abs(arm_scales(robot)).max(axis=0)
+    swing = scales > 0.0
+    low, high = robot.joint_range[swing].T
+    start = robot.standing_qpos[7:][swing]
+    most = np.minimum(high - start, start - low) / scales[swing]
+    return float(max(most.min(initial=np.inf), 0.0))
 
 
 @compiled

@@ -52,10 +52,8 @@ class GaitCommand:
                 raise ConfigError("must be a finite number above 0", field=f"command.{name}")
         if self.arm_swing is not None and not 0.0 <= self.arm_swing < np.inf:
             raise ConfigError("must be a finite number, 0 or above", field="command.arm_swing")
-        if self.step_length is not None:
-            self._check_step_length()
-
-    def _check_step_length(self) -> None:
+        if self.step_length is None:
+            return
         if self.step_time is not None:
             raise ConfigError("give step_time or step_length, not both",
                               field="command.step_length")  # fmt: skip
@@ -70,16 +68,15 @@ class GaitCommand:
     def array(self) -> np.ndarray:
         """(8,) ahead, left [m/s], turn [rad/s], step time [s], width, clearance [m], arm swing
         [rad], step length [m]; 0: the gait's own."""
-        own = (self.step_time, self.width, self.clearance, self.arm_swing, self.step_length)
-        return np.array([self.ahead, self.left, self.turn, *(value or 0.0 for value in own)])
+        own = [getattr(self, name) or 0.0 for name in STEP_PARAMETERS]
+        return np.array([self.ahead, self.left, self.turn, *own])
 
 
 def command_of(array: np.ndarray) -> GaitCommand:
     """The command that `GaitCommand.array` gives as (8,)."""
     ahead, left, turn, *own = (float(value) for value in array)
-    step_time, width, clearance, arm_swing, step_length = (value or None for value in own)
-    return GaitCommand(ahead, left, turn, step_time=step_time, width=width, clearance=clearance,
-                       arm_swing=arm_swing, step_length=step_length)  # fmt: skip
+    told = {name: value or None for name, value in zip(STEP_PARAMETERS, own, strict=True)}
+    return GaitCommand(ahead, left, turn, **told)
 
 
 #: of a command, besides its velocity and turn

@@ -28,19 +28,14 @@ def transfer_factor(omega: float, transfer_time: float) -> float:
 
 @compiled
 def gait_offset(
-    omega: float,
-    step_time: float,
-    transfer_time: float,
-    velocity_x: float,
-    velocity_y: float,
-    outward: float,
+    omega: float, step_time: float, transfer_time: float, vx: float, vy: float, outward: float
 ) -> tuple[float, float]:
-    """b [m], of the velocity [m/s] along the heading; `outward` [m] is the width W towards the side
-    of the foot that swings next, + left."""
+    """b [m], of the velocity v [m/s] along the heading; `outward` [m] is the width W towards the
+    side of the foot that swings next, + left."""
     period = step_time + transfer_time
     growth, factor = np.exp(omega * period), transfer_factor(omega, transfer_time)
     stride = period * factor / (growth - 1.0)
-    return stride * velocity_x, stride * velocity_y + outward * factor / (growth + 1.0)
+    return stride * vx, stride * vy + outward * factor / (growth + 1.0)
 
 
 @compiled

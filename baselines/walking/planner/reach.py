@@ -8,7 +8,11 @@ import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.balance.stepping.planning.config import StepLimits, SwingTask
-from poise.baselines.balance.stepping.planning.swing_speed import highest_lift, swing_time
+from poise.baselines.balance.stepping.planning.swing_speed import (
+    highest,
+    highest_lift,
+    swing_time,
+)
 from poise.configs.errors import ConfigError
 from poise.envs.physics.legs import turn_range
 from poise.envs.robots.robot import Robot
@@ -19,7 +23,6 @@ from .command import GaitCommand
 
 APART = 0.01  # [m] between soles side by side
 ROUNDING = 1e-9  # [m] of a width that a user reads and gives back
-FINE = 1e-3  # [m] to which the highest clearance is found
 
 Pair = tuple[float, float]  # least and most
 #: pairs of a `Reach`
@@ -176,16 +179,12 @@ def _width_range(robot: Robot, limits: StepLimits) -> Pair:
 
 def _highest_clearance(robot: Robot, swing: SwingTask, time: float) -> float:
     """The highest clearance of a swing of `time` [s], to 1 mm and not above what it can [m]."""
-    low, high = 0.0, highest_lift(robot)
-    if swing_time(robot, swing, high) <= time:
-        return high
-    while high - low > FINE:
-        middle = 0.5 * (low + high)
-        if swing_time(robot, swing, middle) <= time:
-            low = middle
-        else:
-            high = middle
-    return low
+
+    def possible(height: float) -> bool:
+        return swing_time(robot, swing, height) <= time
+
+    most = highest_lift(robot)
+    return most if possible(most) else highest(possible, most)
 
 
 def _check_turn(command: GaitCommand, robot: Robot, gait: Gait, limits: StepLimits) -> None:

@@ -5,20 +5,11 @@ The law of the footholds is that of `dcm.py`.
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import (
-    COM_X,
-    COM_Y,
-    COM_Z,
-    COP_X,
-    COP_Y,
-    FOOTHOLD_X,
-    FOOTHOLD_Y,
-    TIME,
-)
+from poise.baselines.balance.references import targets
 from poise.baselines.balance.stepping.planning.cop_region import single_support_region
 from poise.baselines.balance.stepping.planning.guidance import limit_posture
 from poise.baselines.balance.stepping.planning.search import (
-    clip_to_width,
+    clip_to_limits,
     set_start,
     to_step_frame,
     to_world,
@@ -83,7 +74,9 @@ def offset_from(t: WalkTick, swinging: int) -> tuple[float, float]:
     x, y = gait_offset(
         c.state.omega[0], step_time(g), g.transfer_time, g.planned[0], g.planned[1], outward
     )
-    return turned(level[0, 0], level[1, 0], x + c.offsets[COM_X], y + c.offsets[COM_Y])
+    return turned(
+        level[0, 0], level[1, 0], x + c.offsets[targets.COM_X], y + c.offsets[targets.COM_Y]
+    )
 
 
 @compiled
@@ -103,16 +96,16 @@ def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.
     half, length = 0.25 * (stride_x * stride_x + stride_y * stride_y), c.gains.leg_length
     height = min(t.gait.height, np.sqrt(max(length * length - half, 0.0)))
     cos, sin = c.memory.level_frame[0, 0], c.memory.level_frame[1, 0]
-    dx, dy = turned(cos, sin, offsets[COP_X], offsets[COP_Y])
+    dx, dy = turned(cos, sin, offsets[targets.COP_X], offsets[targets.COP_Y])
     rate = s.omega[0] * s.omega[0]
     own.cop[0], own.cop[1] = p[0] + dx, p[1] + dy
     for a in range(2):
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
         own.com_acc[a] = rate * (s.com[a] - own.cop[a])
-    own.com[2] = ground + height + offsets[COM_Z]
+    own.com[2] = ground + height + offsets[targets.COM_Z]
     own.com_vel[2] = own.com_acc[2] = 0.0
     if footholds_given(t):
-        follow_line(t, height + offsets[COM_Z])
+        follow_line(t, height + offsets[targets.COM_Z])
     elif not t.constant_height:
         follow_model(t)
     limit_posture(c)
@@ -137,7 +130,7 @@ def follow_model(t: WalkTick) -> None:
         r.com_vel[a], r.com_acc[a], r.cop[a] = s.com_vel[a], own.com_acc[a], own.cop[a]
     run(t.model)
     r.begun[0] = 1
-    own.com[2] = s.com[2] + r.height[0] + c.offsets[COM_Z]
+    own.com[2] = s.com[2] + r.height[0] + c.offsets[targets.COM_Z]
     own.com_vel[2], own.com_acc[2] = r.height[1], r.height[2]
 
 
@@ -176,8 +169,8 @@ def foothold_after(t: WalkTick, time: float) -> float:
         c.pair[a] = t.stance[a] + way - t.swinging[a]
     q.time[0] = time
     x, y = to_step_frame(q, c.pair[0], c.pair[1])
-    x, y = x + c.offsets[FOOTHOLD_X], y + c.offsets[FOOTHOLD_Y]
-    near_x, near_y = clip_to_width(q, x, y, least_width(t))
+    x, y = x + c.offsets[targets.FOOTHOLD_X], y + c.offsets[targets.FOOTHOLD_Y]
+    near_x, near_y = clip_to_limits(q, x, y, least_width(t))
     q.foothold[0], q.foothold[1] = to_world(q, near_x, near_y)
     return np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
 
@@ -203,7 +196,7 @@ def plan_foothold(t: WalkTick) -> None:
     ground = w.ground[0]
     for k in range(TIMES + 1):
         time = planned if k == 0 else low + (high - low) * (k - 1) / (TIMES - 1)
-        regular = step_time(g) + c.offsets[TIME]
+        regular = step_time(g) + c.offsets[targets.TIME]
         cost = foothold_after(t, time) + g.time_price * abs(w.time[0] + time - regular)
         if footholds_given(t):
             cost += settle_on_tread(t, foot)

@@ -47,7 +47,9 @@ def test_the_foot_is_high_before_it_is_far_and_comes_down_when_it_is_there():
     assert np.all(np.abs(z[high] - top) < 2e-3)
     assert z[x < 0.05].max() > 0.08  # up, where most swings go ahead
     assert x[time >= 0.75 * 0.4].min() > 0.85 * 0.3
-    assert (x[-1], z[-1], speed[-1]) == pytest.approx((0.3, 0.01, -swing.landing_speed), abs=2e-3)
+    assert (x[-1], z[-1], speed[-1]) == pytest.approx(
+        (0.3, 0.01, -swing.arrays.landing_speed), abs=2e-3
+    )
     assert np.abs(np.diff(speed)).max() < 1.5 * np.abs(accel).max() * DT  # C¹ at least, everywhere
 
 

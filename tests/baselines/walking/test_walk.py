@@ -164,7 +164,7 @@ def test_slow_legs_walk_with_steps_that_they_can_do():
     controller = env.controller
     config, units = controller.config.gait, slow.units
     limits = possible_limits(slow, config.limits, config.swing, config.qp.torque.share)
-    tick = controller.walk_tick(env.simulation.state, env.targets)
+    tick = controller.block(env.simulation.state, env.targets)
     pace = units.height * units.omega
     assert limits.speed < config.limits.speed
     assert tick.walk.search.speed == pytest.approx(limits.speed * pace)

@@ -6,6 +6,7 @@ heading of the step. ns is the number of soles, nv that of the degrees of freedo
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,14 @@ from poise.baselines.whole_body.momentum_qp import Tick
 from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
+
+
+def zeros(dtype: type = float, **shapes: int | tuple[int, ...]) -> dict[str, Any]:
+    """The members of a block that kernels write, by name: guarded zeros of these shapes."""
+    return {name: guarded_zeros(shape, dtype) for name, shape in shapes.items()}
 
 
 @dataclass(frozen=True, eq=False)

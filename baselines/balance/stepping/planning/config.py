@@ -1,35 +1,69 @@
 """The configuration of the controllers that step, as their YAML files have it.
 
-Numbers have no units: lengths are in h, times in 1/ω and speeds in h ω, with
-h the height of the standing CoM and ω = √(g/h), unless a comment says otherwise.
+Numbers are in the units of `in_si`: lengths in h, times in 1/ω and speeds in h ω, with h the height
+of the standing CoM and ω = √(g/h); those of fields without one are in their comments.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.maths.pendulum import Units
+
+Unit = Literal["", "h", "1/h", "1/ω", "h ω", "h ω²", "ω²", "ω/(m g)", "°"]
 
 
-def _number(default: float, **bounds: float) -> float:
-    """A field with this default and these bounds, see `poise.configs.schema.build`."""
-    return field(default=default, metadata=bounds)
+def number(default: float, unit: Unit = "", **bounds: Any) -> float:
+    """A field with this default, its unit as of `in_si` and bounds as of `schema.build`."""
+    return field(default=default, metadata={"unit": unit, **bounds})
+
+
+def in_si(block: type[Block], config: Any, units: Units) -> dict[str, Any]:
+    """Those numbers of a configuration that a block has under the same names, in SI units."""
+    found: dict[str, Any] = {}
+    h, omega = units.height, units.omega
+    names = {item.name for item in fields(block) if item.type is float}
+    for item in fields(config):
+        if item.name not in names:
+            continue
+        value = getattr(config, item.name)
+        match item.metadata.get("unit", ""):
+            case "h":
+                value = value * h
+            case "1/h":
+                value = value / h
+            case "1/ω":
+                value = value / omega
+            case "h ω":
+                value = value * h * omega
+            case "h ω²":
+                value = value * h * omega**2
+            case "ω²":
+                value = value * omega**2
+            case "ω/(m g)":
+                value = value * omega / units.force
+            case "°":
+                value = np.radians(value)
+        found[item.name] = float(value)
+    return found
 
 
 @dataclass(frozen=True)
 class StepLimits:
     """The footholds that a foot may reach, from the stance foot in the heading, and its speed."""
 
-    ahead: float = _number(0.75, min=0.0)
-    behind: float = _number(0.7, min=0.0)
-    width_min: float = _number(0.19, above=0.0)  # keeps legs from crossing, feet from touching
-    width_max: float = _number(0.75, above=0.0)
-    speed: float = _number(0.7, above=0.0)  # mean speed of a swing along the heading
-    side_speed: float = _number(0.5, above=0.0)  # and across it
-    time_min: float = _number(0.9, above=0.0)  # from lift-off to touchdown
-    time_max: float = _number(1.4, above=0.0)
+    ahead: float = number(0.75, "h", min=0.0)
+    behind: float = number(0.7, "h", min=0.0)
+    width_min: float = number(0.19, "h", above=0.0)  # keeps legs from crossing, feet from touching
+    width_max: float = number(0.75, "h", above=0.0)
+    speed: float = number(0.7, "h ω", above=0.0)  # mean speed of a swing along the heading
+    side_speed: float = number(0.5, "h ω", above=0.0)  # and across it
+    time_min: float = number(0.9, "1/ω", above=0.0)  # from lift-off to touchdown
+    time_max: float = number(1.4, "1/ω", above=0.0)
 
     def __post_init__(self) -> None:
         if self.time_max < self.time_min:
@@ -42,10 +76,11 @@ class StepLimits:
 class FootholdChoice:
     """The place of a foothold relative to the capture point that it stops, and a step's cost."""
 
-    sagittal_offset: float = 0.04  # beyond ξ along the heading
-    lateral_offset: float = 0.08  # beyond ξ to the foot's own side, so that ξ ends between the feet
-    margin: float = _number(0.06, min=0.0)  # a ξ further inside the CoP region is no better
-    time_price: float = _number(0.04, min=0.0)  # cost of a step's time, in h per 1/ω
+    sagittal_offset: float = number(0.04, "h")  # beyond ξ along the heading
+    # beyond ξ to the foot's own side, so that ξ ends between the feet
+    lateral_offset: float = number(0.08, "h")
+    margin: float = number(0.06, "h", min=0.0)  # a ξ further inside the CoP region is no better
+    time_price: float = number(0.04, "h ω", min=0.0)  # cost of a step's time
 
     RENAMED: ClassVar[Mapping[str, str]] = {
         "overshoot": "sagittal_offset", "outward": "lateral_offset", "haste": "time_price",
@@ -128,29 +163,29 @@ class PivotConfig:
     plan: PivotGains = field(default_factory=PivotGains)  # of the ξ that steps and CoP follow
     swing: PivotGains = field(default_factory=PivotGains)  # of c̈ on one foot
     stance: PivotGains = field(default_factory=PivotGains)  # and on both
-    lateral_fraction: float = _number(1.0, min=0.0)  # of r that counts across the heading
+    lateral_fraction: float = number(1.0, min=0.0)  # of r that counts across the heading
 
 
 @dataclass(frozen=True)
 class RecentringConfig:
     """The return of the feet to the nominal stance, the one of standing."""
 
-    distance: float = _number(0.0, min=0.0)  # of a foot from its nominal place; 0: never
-    calm_speed: float = _number(0.1, min=0.0)  # the robot is calm while its CoM is slower
-    calm_tilt: float = _number(35.0, above=0.0, max=180.0)  # and its root is tilted less [°]
-    calm_time: float = _number(0.5, min=0.0)  # for which it must be calm
+    distance: float = number(0.0, "h", min=0.0)  # of a foot from its nominal place; 0: never
+    calm_speed: float = number(0.1, "h ω", min=0.0)  # the robot is calm while its CoM is slower
+    calm_tilt: float = number(35.0, "°", above=0.0, max=180.0)  # and its root is tilted less
+    calm_time: float = number(0.5, "1/ω", min=0.0)  # for which it must be calm
     # ξ is brought so far from the middle of the stance sole's region, towards where the other foot
     # goes; and besides this fraction of the other foot's way against it, since the leg that swings
     # takes ξ along
-    capture_offset: float = _number(0.025, min=0.0)
-    counterbalance: float = _number(0.07, min=0.0)
-    arrival_radius: float = _number(0.02, above=0.0)  # ξ has arrived when it is this near
-    shift_time_max: float = _number(3.0, min=0.0)  # then the foot lifts off wherever ξ is
-    swing_time: float = _number(1.0, above=0.0)
-    margin: float = 0.015  # by which ξ is to be inside the region of both soles at touchdown
+    capture_offset: float = number(0.025, "h", min=0.0)
+    counterbalance: float = number(0.07, min=0.0)
+    arrival_radius: float = number(0.02, "h", above=0.0)  # ξ has arrived when it is this near
+    shift_time_max: float = number(3.0, "1/ω", min=0.0)  # then the foot lifts off wherever ξ is
+    swing_time: float = number(1.0, "1/ω", above=0.0)
+    margin: float = number(0.015, "h")  # of ξ inside the region of both soles at touchdown
     # most that the CoP is away from ξ after touchdown, so that the foot that has just landed is not
     # relieved again
-    cop_distance: float = _number(0.05, min=0.0)
+    cop_distance: float = number(0.05, "h", min=0.0)
 
     RENAMED: ClassVar[Mapping[str, str]] = {
         "far": "distance", "calm": "calm_speed", "tilt": "calm_tilt", "after": "calm_time",
@@ -166,14 +201,14 @@ class SwingTask:
     Units are those of `whole_body/gains.py`: weights per g² and (g/h)², a stiffness of 1 is ω².
     """
 
-    weight: float = _number(1000.0, above=0.0)
-    turn_weight: float = _number(100.0, above=0.0)
-    yaw_fraction: float = _number(1.0, min=0.0)  # of `turn_weight`, about the vertical
-    stiffness: float = _number(60.0, min=0.0)
-    damping_ratio: float = _number(1.0, min=0.0)  # ζ
-    clearance: float = _number(0.06, above=0.0, max=0.5)  # of the sole above the ground
-    lift: float = _number(0.45, above=0.0, max=0.9)  # fraction of the swing in which it rises
-    landing_speed: float = _number(0.1, min=0.0)  # downwards
+    weight: float = number(1000.0, above=0.0)
+    turn_weight: float = number(100.0, above=0.0)
+    yaw_fraction: float = number(1.0, min=0.0)  # of `turn_weight`, about the vertical
+    stiffness: float = number(60.0, min=0.0)
+    damping_ratio: float = number(1.0, min=0.0)  # ζ
+    clearance: float = number(0.06, "h", above=0.0, max=0.5)  # of the sole above the ground
+    lift: float = number(0.45, above=0.0, max=0.9)  # fraction of the swing in which it rises
+    landing_speed: float = number(0.1, "h ω", min=0.0)  # downwards
 
     RENAMED: ClassVar[Mapping[str, str]] = {"yaw_share": "yaw_fraction"}
 
@@ -190,28 +225,26 @@ class CaptureStepConfig:
     # The first step begins when ξ's distance outside the CoP region of both soles, plus
     # `momentum_gain` · ω L/(m g), is above `step_margin`; L is the angular momentum in the sense of
     # the fall: hips that turn the trunk already have given what they can.
-    step_margin: float = 0.0
-    momentum_gain: float = _number(0.0, min=0.0)
+    step_margin: float = number(0.0, "h")
+    momentum_gain: float = number(0.0, "ω/(m g)", min=0.0)
     # While a motion moves, a first step begins, too, when the root turns away from it and is going
     # to be `turn_limit` [°] off in 0.7/ω; and `step_margin` grows by `crouch_margin` of what the
     # motion has the CoM below 0.95 h, less as the root is turned. 180 and 0 are without.
-    turn_limit: float = field(
-        default=60.0, metadata={"above": 0.0, "max": 180.0, "omit": "default"}
-    )
-    crouch_margin: float = field(default=0.25, metadata={"min": 0.0, "omit": "default"})
-    restep_margin: float = 0.01  # further steps begin when ξ is this far outside
-    gain: float = _number(1.0, above=0.0)  # k of p = ξ + k (ξ − ξ_ref)
-    cop_overreach: float = _number(0.0, min=0.0)  # of p over its region: costs angular momentum
-    region_fraction: float = _number(0.95, above=0.0, max=1.0)  # of the CoP region that counts
-    leg_length: float = _number(0.96, above=0.0)  # at touchdown: sets the CoM's height
-    swing_com_drop: float = _number(0.0, min=0.0)  # the CoM is so much lower in a swing
-    load_time: float = _number(0.1, min=0.0)  # in which a foot takes up its load
-    unload_time: float = _number(0.04, min=0.0)  # in which a foot gives its load away
-    double_support_time: float = _number(0.15, min=0.0)  # least time between two steps
-    torque_rate_limit: float = _number(0.6, above=0.0)  # change in a tick, fraction of the limit
-    root_accel: float = _number(100.0, above=0.0)  # most that the posture asks of the root [ω²]
-    swing_accel: float = _number(100.0, above=0.0)  # the same in a swing [ω²]
-    joint_accel: float = _number(100.0, above=0.0)  # and of the joints [ω²]
+    turn_limit: float = number(60.0, "°", above=0.0, max=180.0, omit="default")
+    crouch_margin: float = number(0.25, min=0.0, omit="default")
+    restep_margin: float = number(0.01, "h")  # further steps begin when ξ is this far outside
+    gain: float = number(1.0, above=0.0)  # k of p = ξ + k (ξ − ξ_ref)
+    cop_overreach: float = number(0.0, "h", min=0.0)  # of p over its region: costs angular momentum
+    region_fraction: float = number(0.95, above=0.0, max=1.0)  # of the CoP region that counts
+    leg_length: float = number(0.96, "h", above=0.0)  # at touchdown: sets the CoM's height
+    swing_com_drop: float = number(0.0, "h", min=0.0)  # the CoM is so much lower in a swing
+    load_time: float = number(0.1, "1/ω", min=0.0)  # in which a foot takes up its load
+    unload_time: float = number(0.04, "1/ω", min=0.0)  # in which a foot gives its load away
+    double_support_time: float = number(0.15, "1/ω", min=0.0)  # least time between two steps
+    torque_rate_limit: float = number(0.6, above=0.0)  # change in a tick, fraction of the limit
+    root_accel: float = number(100.0, "ω²", above=0.0)  # most that the posture asks of the root
+    swing_accel: float = number(100.0, "ω²", above=0.0)  # the same in a swing
+    joint_accel: float = number(100.0, "ω²", above=0.0)  # and of the joints
     limits: StepLimits = field(default_factory=StepLimits)
     foothold: FootholdChoice = field(default_factory=FootholdChoice)
     feedback: StepFeedback = field(default_factory=StepFeedback)
@@ -242,4 +275,4 @@ class IPMStepConfig(CaptureStepConfig):
     """
 
     kind: Literal["ipm-step"] = "ipm-step"  # type: ignore[assignment]
-    arc: float = _number(1.0, min=0.0, max=1.0)  # fraction of the height that a rigid leg gains
+    arc: float = number(1.0, min=0.0, max=1.0)  # fraction of the height that a rigid leg gains

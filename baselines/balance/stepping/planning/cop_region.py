@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.legs import ankle_limits, bearing_polygon, nominal_feet
+from poise.baselines.balance.references.legs import bearing_polygon, nominal_feet
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import convex_hull, stacked
-from poise.envs.compiled.maths.vectors import placed, turn, turned
+from poise.envs.compiled.maths.vectors import placed, turned
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
@@ -52,23 +52,6 @@ def distance_beyond(
 
 
 @compiled
-def distances_beyond(
-    r: RegionArrays,
-    first: np.ndarray,
-    second: np.ndarray,
-    yaw: float,
-    xi: np.ndarray,
-    out: np.ndarray,
-) -> None:
-    """`distance_beyond` for rows of `first`, `second` and `xi` (≥ 1, 2) into `out`; an array of one
-    row stands for as many as there are."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    for i in range(out.shape[0]):
-        f, s, x = first[i % first.shape[0]], second[i % second.shape[0]], xi[i % xi.shape[0]]
-        out[i] = distance_beyond(r, f[0], f[1], s[0], s[1], cos, sin, x[0], x[1])
-
-
-@compiled
 def single_support_region(
     r: RegionArrays, sole: int, point: np.ndarray, cos: float, sin: float, out: np.ndarray
 ) -> int:
@@ -110,12 +93,15 @@ class CopRegion(Copyable):
     """
 
     def __init__(self, robot: Robot, fraction: float = 0.95):
-        self.robot, self._fraction = robot, fraction
-        self._limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
-        self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
+        self.robot = robot
+        self.alone = [bearing_polygon(robot, i, 1.0, fraction) for i in range(len(robot.soles))]
         self.middle = [polygon.mean(axis=0) for polygon in self.alone]
         if len(robot.soles) == 2:
-            sums = [self._sum(load) for load in LOAD_FRACTIONS]
+            sums = []
+            for load in LOAD_FRACTIONS:
+                first = load * bearing_polygon(robot, 0, load, fraction)
+                second = (1.0 - load) * bearing_polygon(robot, 1, 1.0 - load, fraction)
+                sums.append((first[:, None] + second[None]).reshape(-1, 2))
             self.arrays = RegionArrays(
                 alone=stacked(self.alone),
                 corners=np.array([len(corners) for corners in self.alone]),
@@ -126,17 +112,6 @@ class CopRegion(Copyable):
                 load_fractions=np.array(LOAD_FRACTIONS),
             )
 
-    def _under(self, sole: int, load: float) -> np.ndarray:
-        return bearing_polygon(self.robot, sole, load, self._fraction, self._limits[sole])
-
-    def _sum(self, load: float) -> np.ndarray:
-        first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)
-        return (first[:, None] + second[None]).reshape(-1, 2)
-
-    def one(self, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
-        """(k, 2) The region of the sole alone at `point` (≥ 2,), turned by `yaw` [m]."""
-        return point[:2] + self.alone[sole] @ turn(yaw).T
-
     def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
         """(k, 2) The region of two soles at `points` (2, ≥ 2), turned by `yaw` [m]."""
         r = self.arrays
@@ -144,18 +119,6 @@ class CopRegion(Copyable):
         out = guarded_zeros((2 * len(cloud) + 1, 2))
         n = double_support_region(r, np.array(points), np.cos(yaw), np.sin(yaw), cloud, out)
         return out[:n]
-
-    def beyond(
-        self, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
-    ) -> np.ndarray:
-        """(n,) How far points `xi` (n, 2) lie outside the region of both soles [m]; < 0 inside.
-
-        The soles are at `first` and `second`, (n, 2) or (2,); see `distance_beyond`.
-        """
-        rows = [np.array(v, dtype=float, ndmin=2) for v in (first, second, xi)]
-        out = np.empty(max(len(points) for points in rows))
-        distances_beyond(self.arrays, rows[0], rows[1], yaw, rows[2], out)
-        return out if max(np.ndim(v) for v in (first, second, xi)) > 1 else out[0]
 
 
 def rest_ahead(region: CopRegion) -> float:

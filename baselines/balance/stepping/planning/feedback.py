@@ -41,10 +41,7 @@ LX, LY = 3, 4  # of the centroidal momentum [P; L]
 
 
 def feedback_arrays(
-    robot: Robot,
-    always: StepFeedback,
-    falls: Mapping[str, FallFeedback],
-    pivot: PivotConfig,
+    robot: Robot, always: StepFeedback, falls: Mapping[str, FallFeedback], pivot: PivotConfig
 ) -> FeedbackArrays:
     """K for one robot: gains that hold always, and those that `falls` add in a first step."""
     h, omega = robot.height_com, robot.omega

@@ -2,15 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import (
-    COM_X,
-    COM_Y,
-    COM_Z,
-    COP_X,
-    COP_Y,
-    LEAN_X,
-    LEAN_Y,
-)
+from poise.baselines.balance.references import targets
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import copy_into, rotated, rotation_error, turn_error, turned
@@ -28,7 +20,7 @@ UPRIGHT = 0.95  # [h] a motion that has the CoM lower crouches
 @compiled
 def crouch(t: CaptureTick) -> float:
     """How far below 0.95 h the motion has the CoM [m]; 0 where it stands."""
-    height = t.reference_in.com[2] - t.state.origin[2] - t.offsets[COM_Z]
+    height = t.reference_in.com[2] - t.state.origin[2] - t.offsets[targets.COM_Z]
     return max(UPRIGHT * t.robot.height_com - height, 0.0)
 
 
@@ -62,7 +54,7 @@ def copy_reference(t: CaptureTick) -> None:
     copy_into(given.q_ref, own.q_ref)
     copy_into(given.v_ref, own.v_ref)
     copy_into(given.angular_momentum, own.angular_momentum)
-    x, y = t.offsets[LEAN_X], t.offsets[LEAN_Y]
+    x, y = t.offsets[targets.LEAN_X], t.offsets[targets.LEAN_Y]
     angle = np.sqrt(x * x + y * y)
     cos, sin = np.cos(angle), np.sin(angle)
     if angle > 0.0:
@@ -107,7 +99,7 @@ def guide_com(
         rest_y += sin * g.rest_ahead
     if t.recentring.stage[0] == SHIFTING:
         rest_x, rest_y = t.recentring.capture_target[0], t.recentring.capture_target[1]
-    x, y = turned(cos, sin, offsets[COM_X], offsets[COM_Y])
+    x, y = turned(cos, sin, offsets[targets.COM_X], offsets[targets.COM_Y])
     rest_x += x
     rest_y += y
     back = t.memory.return_fraction[0]
@@ -123,8 +115,8 @@ def guide_com(
     find_nearest(region, desired, p)
     over_x, over_y = desired[0] - p[0], desired[1] - p[1]
     scale = min(1.0, overreach / max(np.sqrt(over_x * over_x + over_y * over_y), 1e-9))
-    p[0] += over_x * scale + cos * offsets[COP_X] - sin * offsets[COP_Y]
-    p[1] += over_y * scale + sin * offsets[COP_X] + cos * offsets[COP_Y]
+    p[0] += over_x * scale + cos * offsets[targets.COP_X] - sin * offsets[targets.COP_Y]
+    p[1] += over_y * scale + sin * offsets[targets.COP_X] + cos * offsets[targets.COP_Y]
     for a in range(2):
         own.com[a], own.com_vel[a], own.cop[a] = s.com[a], s.com_vel[a], p[a]
         own.com_acc[a] = s.omega[0] * s.omega[0] * (s.com[a] - p[a])
@@ -134,7 +126,7 @@ def guide_com(
     own.com_acc[1] += s.omega[0] * s.omega[0] * y
     half = 0.25 * (stride_x * stride_x + stride_y * stride_y)
     leg_height = np.sqrt(max(g.leg_length * g.leg_length - half, 0.0))
-    own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets[COM_Z]
+    own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets[targets.COM_Z]
     if t.memory.swinging[0]:
         own.com[2] += t.search.feedback.added[HEIGHT] - g.swing_com_drop
     own.com_vel[2] = own.com_acc[2] = 0.0

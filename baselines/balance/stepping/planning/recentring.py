@@ -12,7 +12,6 @@ from poise.baselines.balance.references.legs import nominal_feet
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .blocks import (
@@ -25,8 +24,9 @@ from .blocks import (
     Recentring,
     Search,
     SwingArrays,
+    zeros,
 )
-from .config import RecentringConfig
+from .config import RecentringConfig, in_si
 from .feedback import PHASE
 from .search import (
     distance_outside,
@@ -50,27 +50,13 @@ SLIP_TIME, SLIP_SPEED = 0.04, 0.25
 
 def recentring_arrays(robot: Robot, config: RecentringConfig) -> Recentring:
     """`config` for one robot."""
-    c, h, omega = config, robot.height_com, robot.omega
     feet = nominal_feet(robot)
     return Recentring(
-        distance=c.distance * h,
-        calm_speed=c.calm_speed * h * omega,
-        calm_cosine=float(np.cos(np.radians(c.calm_tilt))),
-        calm_time=c.calm_time / omega,
-        capture_offset=c.capture_offset * h,
-        counterbalance=c.counterbalance,
-        arrival_radius=c.arrival_radius * h,
-        shift_time_max=c.shift_time_max / omega,
-        swing_time=c.swing_time / omega,
-        margin=c.margin * h,
-        cop_distance=c.cop_distance * h,
+        **in_si(Recentring, config, robot.units),
+        calm_cosine=float(np.cos(np.radians(config.calm_tilt))),
         nominal=(feet[0] - feet[1])[:2].copy(),
-        stage=guarded_zeros(1, dtype=np.int64),
-        foot=guarded_zeros(1, dtype=np.int64),
-        homing=guarded_zeros(1, dtype=np.int64),
-        slip_time=guarded_zeros(2),
-        timer=guarded_zeros(1),
-        capture_target=guarded_zeros(2),
+        **zeros(np.int64, stage=1, foot=1, homing=1),
+        **zeros(slip_time=2, timer=1, capture_target=2),
     )
 
 

@@ -83,18 +83,13 @@ def with_offsets(q: Search, x: float, y: float) -> tuple[float, float]:
 
 
 @compiled
-def clip_to_limits(q: Search, x: float, y: float) -> tuple[float, float]:
+def clip_to_limits(q: Search, x: float, y: float, least: float) -> tuple[float, float]:
     """Return the foothold (x, y) [m], in the frame of the step, within limits of place and speed.
 
-    The place is limited to a box. The mean velocities vx and vy of the swing are limited to the
-    ellipse (vx/`speed`)² + (vy/`side_speed`)² ≤ 1: the way from the start is shortened to it.
+    The place is limited to a box, with the feet `least` apart [m] or more across the heading. The
+    mean velocities vx and vy of the swing are limited to the ellipse (vx/`speed`)² +
+    (vy/`side_speed`)² ≤ 1: the way from the start is shortened to it.
     """
-    return clip_to_width(q, x, y, q.width_min)
-
-
-@compiled
-def clip_to_width(q: Search, x: float, y: float, least: float) -> tuple[float, float]:
-    """The same with another `least` distance of the feet across the heading [m]."""
     side, start = q.foot_sign[q.foot[0]], to_step_frame(q, q.start[0], q.start[1])
     x = min(max(x, -q.behind), q.ahead)
     y = side * min(max(side * y, least), q.width_max)
@@ -138,7 +133,7 @@ def capture_foothold(q: Search) -> None:
     x += q.sagittal_offset * np.tanh(x / (0.1 * q.height))
     y += q.foot_sign[foot] * q.lateral_offset
     x, y = with_offsets(q, x, y)
-    x, y = clip_to_limits(q, x, y)
+    x, y = clip_to_limits(q, x, y, q.width_min)
     q.foothold[0], q.foothold[1] = to_world(q, x, y)
     q.cost[0] = max(distance_outside(q, end_x, end_y), -q.margin)
 

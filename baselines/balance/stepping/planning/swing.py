@@ -10,8 +10,8 @@ from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 
-from .blocks import SwingArrays
-from .config import SwingTask
+from .blocks import SwingArrays, zeros
+from .config import SwingTask, in_si
 
 LANDING = 0.6  # fraction of a swing after which contact is touchdown, not the lift-off
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
@@ -19,14 +19,7 @@ FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
 @compiled
 def quintic(
-    p0: float,
-    v0: float,
-    a0: float,
-    p1: float,
-    v1: float,
-    a1: float,
-    duration: float,
-    t: float,
+    p0: float, v0: float, a0: float, p1: float, v1: float, a1: float, duration: float, t: float
 ) -> tuple[float, float, float]:
     """Position, velocity, acceleration at `t` of the polynomial of degree five that leads from
     (p0, v0, a0) to (p1, v1, a1) in `duration`: the way of least jerk [Flash85]."""
@@ -77,14 +70,9 @@ def _lead(
 
 
 @compiled
-def advance_swing(w: SwingArrays, dt: float) -> None:
-    """Go `dt` [s] further: up to the apex, down to the ground, on at the landing speed."""
-    advance_over(w, w.apex, dt)
-
-
-@compiled
 def advance_over(w: SwingArrays, apex: float, dt: float) -> None:
-    """The same with another `apex` above the ground [m]."""
+    """Go `dt` [s] further: up to an `apex` above the ground [m], down to it, on at the landing
+    speed."""
     rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
     for a in range(2):
         if rest > dt:
@@ -120,22 +108,12 @@ class Swing(Copyable):
     and goes on at the landing speed where the ground is late.
     """
 
-    FROZEN = FROZEN
-
     def __init__(self, point: np.ndarray, duration: float, task: SwingTask, units: Units):
-        height = units.height
-        speed = task.landing_speed * height * units.omega
         self.task = task
         self.arrays = SwingArrays(
-            reference=guarded_zeros((3, 3)),
-            foothold=guarded_zeros(2),
-            time=guarded_zeros(1),
-            duration=guarded_zeros(1),
-            ground=guarded_zeros(1),
-            time_offset=guarded_zeros(1),
-            apex=task.clearance * height,
-            lift=task.lift,
-            landing_speed=float(speed),
+            **in_si(SwingArrays, task, units),
+            apex=task.clearance * units.height,
+            **zeros(reference=(3, 3), foothold=2, time=1, duration=1, ground=1, time_offset=1),
         )
         start_swing(self.arrays, np.array(point, dtype=float), float(point[2]), float(duration))
 
@@ -160,24 +138,9 @@ class Swing(Copyable):
         return float(self.arrays.duration[0])
 
     @property
-    def landing_speed(self) -> float:
-        """The speed downwards at which the foot meets the ground [m/s]."""
-        return self.arrays.landing_speed
-
-    @property
     def remaining(self) -> float:
         """The time until touchdown is planned [s]."""
         return time_left(self.arrays)
-
-    def aim(self, foothold: np.ndarray, duration: float | None = None) -> None:
-        """Lead to another `foothold` (2,), or at another time, see `aim_swing`."""
-        duration = self.duration if duration is None else duration
-        aim_swing(self.arrays, float(foothold[0]), float(foothold[1]), float(duration))
-
-    def advance(self, dt: float) -> np.ndarray:
-        """(3, 3) Position, velocity and acceleration [m, s] after `dt` more seconds."""
-        advance_swing(self.arrays, dt)
-        return self.reference.copy()
 
 
 def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:

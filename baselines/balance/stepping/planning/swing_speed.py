@@ -9,6 +9,7 @@ A foot that goes from rest to rest on a polynomial of degree five is midway 15/8
 the mean.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -17,13 +18,16 @@ import mujoco
 import numpy as np
 from scipy.optimize import linprog
 
+from poise.baselines.balance.references.postures import sole_pose
 from poise.envs.physics.arrays import dof_chain
+from poise.envs.physics.legs import standing_data
 from poise.envs.robots.robot import Robot
 
 from .config import StepLimits, SwingTask
 
 PEAK = 15.0 / 8.0  # of a speed over its mean, from rest to rest
 ROUNDS, STEP, CLOSE = 60, 0.05, 1e-6  # of the lift; most that a round turns a joint [rad]; [m]
+FINE = 1e-3  # [m] to which heights are found
 NEAR = 1e-3  # [m] where only whether a place is reached counts
 STILL = 1e-6  # [m/s] of a foot that its joints do not move at all
 ROLL, PITCH = 3, 4  # rows of a sole's Jacobian, after those of its place
@@ -86,10 +90,19 @@ def swing_time(
 def highest_lift(robot: Robot) -> float:
     """The height to which either foot can be lifted straight up in the standing posture, within
     its joints' ranges, to 1 mm [m]."""
-    low, high = 0.0, robot.height_com
-    while high - low > 1e-3:
+
+    def possible(height: float) -> bool:
+        return all(_lifts(robot, sole, height) for sole in range(len(robot.soles)))
+
+    return highest(possible, robot.height_com)
+
+
+def highest(possible: Callable[[float], bool], high: float) -> float:
+    """The highest of the heights below `high` that are possible, to 1 mm and not above it [m]."""
+    low = 0.0
+    while high - low > FINE:
         middle = 0.5 * (low + high)
-        if all(_lifts(robot, sole, middle) for sole in range(len(robot.soles))):
+        if possible(middle):
             low = middle
         else:
             high = middle
@@ -98,16 +111,13 @@ def highest_lift(robot: Robot) -> float:
 
 def _lifts(robot: Robot, sole: int, clearance: float) -> bool:
     """Whether the leg's joints, within their ranges, lift the sole by `clearance`, level or not."""
-    model, data = robot.model, mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    dofs = np.array([dof for dof in dof_chain(model, robot.soles[sole].body_id) if dof >= 6])
-    low, high = _ranges(model, dofs)
-    mujoco.mj_kinematics(model, data)
-    goal = _point(robot, data, sole) + [0.0, 0.0, clearance]
+    model, data, dofs = robot.model, standing_data(robot), _leg_dofs(robot, sole)
+    low, high = robot.joint_range[dofs - 6].T
+    goal = sole_pose(data, robot.soles[sole])[0] + [0.0, 0.0, clearance]
     for _ in range(ROUNDS):
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        off = goal - _point(robot, data, sole)
+        off = goal - sole_pose(data, robot.soles[sole])[0]
         if np.abs(off).max() < NEAR:
             return True
         place, rows = data.qpos[dofs + 1], _jacobian(robot, data, sole, dofs)[:3]
@@ -118,19 +128,15 @@ def _lifts(robot: Robot, sole: int, clearance: float) -> bool:
     return False
 
 
-def _ranges(model: mujoco.MjModel, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) where the joints of these degrees of freedom end, infinite where they do not."""
-    joints = model.dof_jntid[dofs]
-    limited = model.jnt_limited[joints].astype(bool)
-    low, high = model.jnt_range[joints].T
-    return np.where(limited, low, -np.inf), np.where(limited, high, np.inf)
+def _leg_dofs(robot: Robot, sole: int) -> np.ndarray:
+    """(n,) degrees of freedom of the joints between the root and a sole."""
+    chain = dof_chain(robot.model, robot.soles[sole].body_id)
+    return np.array([dof for dof in chain if dof >= 6])
 
 
 def _foot_speed(robot: Robot, sole: int, clearance: float, share: float) -> SwingSpeed:
     """The speeds of one foot."""
-    model, data = robot.model, mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    dofs = np.array([dof for dof in dof_chain(model, robot.soles[sole].body_id) if dof >= 6])
+    data, dofs = standing_data(robot), _leg_dofs(robot, sole)
     way = _lift(robot, data, sole, dofs, clearance)
     fastest = _joint_speeds(robot, data, dofs, share) / PEAK
     rows = _jacobian(robot, data, sole, dofs)
@@ -157,12 +163,12 @@ def _lift(
     robot: Robot, data: mujoco.MjData, sole: int, dofs: np.ndarray, clearance: float
 ) -> np.ndarray | None:
     """(n,) the way of the leg's joints that lifts the level sole; None if none is found."""
-    start, goal = data.qpos[dofs + 1].copy(), None
+    start = data.qpos[dofs + 1].copy()
+    goal = sole_pose(data, robot.soles[sole])[0] + [0.0, 0.0, clearance]
     for _ in range(ROUNDS):
         mujoco.mj_kinematics(robot.model, data)
         mujoco.mj_comPos(robot.model, data)
-        place = _point(robot, data, sole)
-        goal = place + [0.0, 0.0, clearance] if goal is None else goal
+        place = sole_pose(data, robot.soles[sole])[0]
         if np.abs(goal - place).max() < CLOSE:
             return data.qpos[dofs + 1] - start
         rows = _jacobian(robot, data, sole, dofs)
@@ -199,12 +205,7 @@ def _fastest(rows: np.ndarray, axis: int, fastest: np.ndarray) -> float:
 def _jacobian(robot: Robot, data: mujoco.MjData, sole: int, dofs: np.ndarray) -> np.ndarray:
     """(6, n) of a sole's reference point, its place and then its turn; the robot faces along x."""
     rows = np.zeros((6, robot.model.nv))
-    place = _point(robot, data, sole)
-    mujoco.mj_jac(robot.model, data, rows[:3], rows[3:], place, robot.soles[sole].body_id)
-    return rows[:, dofs]
-
-
-def _point(robot: Robot, data: mujoco.MjData, sole: int) -> np.ndarray:
-    """(3,) a sole's reference point [m]."""
     foot = robot.soles[sole]
-    return data.xpos[foot.body_id] + data.xmat[foot.body_id].reshape(3, 3) @ foot.position
+    place, _ = sole_pose(data, foot)
+    mujoco.mj_jac(robot.model, data, rows[:3], rows[3:], place, foot.body_id)
+    return rows[:, dofs]

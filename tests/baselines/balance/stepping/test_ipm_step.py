@@ -106,7 +106,7 @@ def test_without_limits_a_linear_pendulum_steps_onto_the_capture_point():
         cos, sin = state.heading
         found[arc] = footholds + np.array([[cos, -sin], [sin, cos]]) @ plan.region.middle[0]
         np.testing.assert_allclose(cut, 0.0, atol=1e-12)
-    under = plan.region.one(1, state.sole_points[1], yaw)
+    under = planned.alone(plan.region, 1, state.sole_points[1], yaw)
     p = nearest_inside(under, state.capture_point)
     for k, t in enumerate(times):
         xi = drifted(state.capture_point, p, state.omega, t)

@@ -83,9 +83,9 @@ def test_a_running_step_is_planned_as_by_the_readable_planner(offset, feedback):
         foot = seed % 2
         swing = Swing(state.sole_points[foot], 0.35, SwingTask(), robot().units)
         swing.arrays.time_offset[0] = offset
-        swing.aim(state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
+        planned.aim(swing, state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
         for _ in range(rng.integers(1, 60)):
-            swing.advance(0.004)
+            planned.advance(swing, 0.004)
         agree(
             planned.replan(plans, state, foot, yaw, swing), readable.replan(state, foot, yaw, swing)
         )

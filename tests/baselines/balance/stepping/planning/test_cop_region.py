@@ -16,6 +16,7 @@ from poise.envs.compiled.maths.polygons import clipped
 from poise.envs.compiled.maths.vectors import turn
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
+from tests.support import planned
 from tests.support import stepping_reference as readable
 from tests.support.shared import robot
 from tests.support.stepping_reference import drifted
@@ -91,8 +92,8 @@ def test_two_soles_reach_further_than_one():
     """Each sole's own reach is inside; in the middle the ankles share the load and reach more."""
     region, feet = CopRegion(robot()), np.array([[0.0, 0.09], [0.0, -0.09]])
     for i in range(2):
-        own = region.one(i, feet[i], 0.0)
-        assert np.all(region.beyond(feet[0], feet[1], 0.0, own) < 1e-9)
+        own = planned.alone(region, i, feet[i], 0.0)
+        assert np.all(planned.beyond(region, feet[0], feet[1], 0.0, own) < 1e-9)
     ahead = region.alone[0][:, 0].max()
     assert region.both(feet, 0.0)[:, 0].max() > ahead + 0.02
 
@@ -105,10 +106,10 @@ def test_distance_beyond_the_reach_agrees_with_its_hull():
         feet = rng.uniform(-0.2, 0.2, (2, 2)) + np.array([[0.0, 0.2], [0.0, -0.2]])
         feet = feet @ turn(yaw).T
         corners = region.both(feet, yaw)
-        gaps = region.beyond(feet[0], feet[1], yaw, corners)
+        gaps = planned.beyond(region, feet[0], feet[1], yaw, corners)
         assert np.all(gaps < 1e-9) and np.all(gaps > -0.01)
         far = feet.mean(axis=0) + np.array([5.0, 0.0])
-        assert region.beyond(feet[0], feet[1], yaw, far) > 3.0
+        assert planned.beyond(region, feet[0], feet[1], yaw, far) > 3.0
 
 
 def generic_feet(rng):
@@ -161,7 +162,7 @@ def test_distance_beyond_the_reach_is_that_of_the_readable_form():
     for _ in range(20):
         feet, yaw = generic_feet(rng)
         xi = feet.mean(axis=0) + rng.uniform(-0.3, 0.3, 2)
-        found = region.beyond(feet[0], feet[1], yaw, xi)
+        found = planned.beyond(region, feet[0], feet[1], yaw, xi)
         assert found == pytest.approx(readable.beyond(region, *feet, yaw, xi), abs=1e-9)
 
 

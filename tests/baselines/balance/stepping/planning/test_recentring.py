@@ -25,6 +25,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller
 from poise.envs.physics.simulation import Simulation
 from tests.baselines.balance.stepping.test_capture_step import trial
+from tests.support import planned
 from tests.support import stepping_reference as readable
 from tests.support.shared import robot
 
@@ -118,7 +119,8 @@ def test_foothold_home(shift):
     readers = readable.ReadablePlanner(planner)
     time = controller.config.recentring.swing_time / controller.robot.omega
     catch, _ = readers.foothold(state, 1, 0.0, time, foot)
-    p = readable.nearest_inside(controller.region.one(0, stance, 0.0), state.capture_point)
+    own = planned.alone(controller.region, 0, stance, 0.0)
+    p = readable.nearest_inside(own, state.capture_point)
     end = readable.drifted(state.capture_point, p, state.omega, time)
     rest = stance - recentring.nominal
     for share in np.linspace(0.0, 1.0, 9):
@@ -171,7 +173,7 @@ def test_a_foot_that_slipped_is_lowered():
     lower_foot(t, 1)
     assert controller.swing is not None and controller.foot == 1
     assert controller.swing.reference[1, 0] == 0.5
-    heights = [controller.swing.advance(0.004)[0, 2] for _ in range(60)]
+    heights = [planned.advance(controller.swing, 0.004)[0, 2] for _ in range(60)]
     assert max(heights) < heights[0] + 0.01  # it does not rise again
     assert heights[-1] < 0.0
 

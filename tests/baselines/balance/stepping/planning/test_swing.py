@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.stepping.planning.config import SwingTask
-from poise.baselines.balance.stepping.planning.swing import Swing, quintic
+from poise.baselines.balance.stepping.planning.swing import FROZEN, Swing, quintic
 from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.compiled.maths.vectors import rotation_error
 from poise.envs.physics.simulation import Simulation
+from tests.support import planned
 from tests.support import stepping_reference as readable
 from tests.support.shared import generic_state, robot
 from tests.support.tasks import swing_rows
@@ -19,12 +20,12 @@ UNITS = Units(60.0, 9.81, HEIGHT)
 def way(moves=(), duration=0.3, after=0.05):
     """(n, 3, 3) reference of a step of 0.4 m; `moves` are (time, foothold, duration)."""
     swing = Swing(np.array([0.1, 0.2, 0.0]), duration, SwingTask(), UNITS)
-    swing.aim(np.array([0.5, 0.2]))
+    planned.aim(swing, np.array([0.5, 0.2]))
     rows, moves = [swing.reference.copy()], list(moves)
     while swing.time < swing.duration + after:
         if moves and swing.time >= moves[0][0]:
-            swing.aim(*moves.pop(0)[1:])
-        rows.append(swing.advance(DT))
+            planned.aim(swing, *moves.pop(0)[1:])
+        rows.append(planned.advance(swing, DT))
     return np.array(rows), swing
 
 
@@ -36,7 +37,7 @@ def generic_ends(seed):
 def test_the_landing_speed_goes_by_the_gravity_of_the_robot():
     """Its unit is h ω: a quarter of the gravity halves it."""
     here, moon = (
-        Swing(np.zeros(3), 0.3, SwingTask(), Units(60.0, gravity, HEIGHT)).landing_speed
+        Swing(np.zeros(3), 0.3, SwingTask(), Units(60.0, gravity, HEIGHT)).arrays.landing_speed
         for gravity in (9.81, 0.25 * 9.81)
     )
     assert here == pytest.approx(SwingTask().landing_speed * np.sqrt(9.81 * HEIGHT))
@@ -61,10 +62,10 @@ def test_quintic_is_its_own_derivative():
 def test_the_way_is_that_of_the_readable_form():
     """Every tick's reference follows from the last one: to the apex, down, and on."""
     swing = Swing(np.array([0.1, 0.2, 0.01]), 0.3, SwingTask(), UNITS)
-    swing.aim(np.array([0.5, 0.1]))
+    planned.aim(swing, np.array([0.5, 0.1]))
     while swing.time < 0.34:
         expected = readable.advanced(swing, DT)
-        np.testing.assert_allclose(swing.advance(DT), expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(planned.advance(swing, DT), expected, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("moves", [(), ((0.1, np.array([0.45, 0.3]), 0.35),)])
@@ -94,16 +95,18 @@ def test_late_ground_is_sought_at_the_landing_speed():
     """After the planned touchdown the foot goes on down, and only down."""
     rows, swing = way(after=0.1)
     late = rows[-10:]
-    np.testing.assert_allclose(late[:, 1], [[0.0, 0.0, -swing.landing_speed]] * 10, atol=1e-9)
+    np.testing.assert_allclose(
+        late[:, 1], [[0.0, 0.0, -swing.arrays.landing_speed]] * 10, atol=1e-9
+    )
 
 
 def test_foothold_is_fixed_shortly_before_touchdown():
     """In the last 30 ms another foothold changes nothing."""
     swing = Swing(np.zeros(3), 0.2, SwingTask(), UNITS)
-    swing.aim(np.array([0.3, 0.0]))
-    while swing.remaining > Swing.FROZEN:
-        swing.advance(DT)
-    swing.aim(np.array([0.6, 0.0]))
+    planned.aim(swing, np.array([0.3, 0.0]))
+    while swing.remaining > FROZEN:
+        planned.advance(swing, DT)
+    planned.aim(swing, np.array([0.6, 0.0]))
     assert swing.foothold[0] == 0.3
 
 
