@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, ParamSpec, TypeGuard, TypeVar
+from typing import ParamSpec, TypeGuard, TypeVar
 
 from poise.configs.errors import ConfigError
 from poise.configs.reading import whole_path
@@ -130,7 +130,8 @@ def named(*controllers: object) -> list[str]:
             found += named(*controller)
             continue
         if isinstance(controller, (str, Path)) and not is_plugin(controller):
-            controller = _file(Path(controller))
+            is_yaml = Path(controller).suffix in (".yaml", ".yml") and os.path.isfile(controller)
+            controller = read_yaml(Path(controller)) if is_yaml else None
         if isinstance(controller, Mapping):
             kind = controller.get("kind")  # anything that a user has handed over
             outside = isinstance(kind, str) and kind == "outside"
@@ -152,21 +153,16 @@ def allow_words(controller: str) -> list[str]:
     return [word for name in names for word in ("--allow", name)]
 
 
-@dataclass(frozen=True)
-class Carried(Generic[P, R]):
-    """A function that may run what was allowed where it was made; other processes are sent it."""
-
-    function: Callable[P, R]
-    allowance: Allowance
-
-    def __call__(self, *arguments: P.args, **options: P.kwargs) -> R:
-        with _opened(self.allowance.names, self.allowance.source):
-            return self.function(*arguments, **options)
+def carried(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, taking what is allowed here to wherever it is called; it can be pickled."""
+    return functools.partial(_inside, _current.get(), function)
 
 
-def carried(function: Callable[P, R]) -> Carried[P, R]:
-    """The function, taking what is allowed here to wherever it is called."""
-    return Carried(function, _current.get())
+def _inside(
+    allowance: Allowance, function: Callable[P, R], *arguments: P.args, **options: P.kwargs
+) -> R:
+    with _opened(allowance.names, allowance.source):
+        return function(*arguments, **options)
 
 
 @contextmanager
@@ -177,12 +173,6 @@ def _opened(names: frozenset[str], source: str | None) -> Iterator[None]:
         yield
     finally:
         _current.reset(token)
-
-
-def _file(path: Path) -> Mapping[str, object] | None:
-    """The fields of a controller's file; of anything else nothing."""
-    is_yaml = path.suffix in (".yaml", ".yml") and os.path.isfile(path)
-    return read_yaml(path) if is_yaml else None
 
 
 def _key(name: str, source: str | None, field: str) -> str:

@@ -105,15 +105,12 @@ class Targets(Copyable):
 
     def take(self, other: "Targets") -> None:
         """Copy the values of others."""
-        for own, array in zip(self._own(), other._own(), strict=True):
+        for own, array in zip(_MEMBERS(self), _MEMBERS(other), strict=True):
             own[:] = array
-
-    def _own(self) -> tuple[np.ndarray, ...]:
-        return _MEMBERS(self)
 
     def arrays(self) -> TargetArrays:
         """The same arrays, not copies, for compiled code."""
-        arrays = self._own()
+        arrays = _MEMBERS(self)
         if not self._arrays or any(map(is_not, arrays, self._arrays)):
             self._arrays = arrays
             self._block = TargetArrays(*arrays)
@@ -242,17 +239,14 @@ class WrappedController(BaseController):
 
     @property
     def failures(self) -> int:
-        """See `BaseController`."""
         return self._base.failures
 
     @property
     def vdot(self) -> np.ndarray | None:
-        """See `BaseController`."""
         return self._base.vdot
 
     @property
     def root_wrench(self) -> np.ndarray:
-        """See `BaseController`."""
         return self._base.root_wrench
 
     @property
@@ -261,15 +255,12 @@ class WrappedController(BaseController):
         return self.inner.unwrapped if isinstance(self.inner, BaseController) else self.inner
 
     def reset(self, state: RobotState) -> None:
-        """Forget everything; a new trial starts at `state`."""
         self.inner.reset(state)
 
     def check(self) -> None:
-        """See `BaseController`."""
         self._base.check()
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] to hold for one `period`."""
         return self.inner.torques(state, targets)
 
     def another(self) -> BaseController:

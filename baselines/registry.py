@@ -124,26 +124,25 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
         raise ConfigError(
             f"{shown(str(name_or_path))} is of kind {config.kind!r}, not a momentum QP",
             field="controller",
-            choices=[
-                name
-                for name in packaged("controllers")
-                if isinstance(controller_config(name), MomentumQPConfig)
-            ],
+            choices=_packaged(MomentumQPConfig),
         )
     return config
 
 
 def walking_controllers(*, planners: bool = False) -> list[str]:
     """The packaged controllers that walk, or those of them that plan their steps."""
-    found = {name: controller_config(name) for name in packaged("controllers")}
-    kinds = (WalkConfig,) if planners else (WalkConfig, SimbiconConfig)
-    return [name for name, config in found.items() if isinstance(config, kinds)]
+    return _packaged(WalkConfig) if planners else _packaged(WalkConfig, SimbiconConfig)
 
 
 def performing_controllers() -> list[str]:
     """The packaged controllers that perform motions whose feet leave the ground."""
-    found = {name: controller_config(name) for name in packaged("controllers")}
-    return [name for name, config in found.items() if isinstance(config, MotionStepConfig)]
+    return _packaged(MotionStepConfig)
+
+
+def _packaged(*kinds: type) -> list[str]:
+    """The packaged controllers whose configurations are of these classes."""
+    names = packaged("controllers")
+    return [name for name in names if isinstance(controller_config(name), kinds)]
 
 
 def load_controller(

@@ -71,7 +71,7 @@ class CommandedEnv(BalanceEnv):
         """Raise ConfigError with the robot's limits for a command that is out of its reach, and
         for a controller that does not walk."""
         self._expect_orders("environment")
-        self._check_reach(command)
+        check_reach(self._walker, command)
 
     @property
     def reach(self) -> Reach | None:
@@ -94,28 +94,21 @@ class CommandedEnv(BalanceEnv):
             )
         return self._orders
 
-    def _check_reach(self, command: GaitCommand) -> None:
-        if self._walker is not None:
-            check_reach(self._walker, command)
-
     def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:
         """The commands of an episode that begins with these options."""
         return parse_commands(options["command"]) if "command" in options else ()
 
-    def _tell_terrain(self) -> None:
-        """Tell a controller that plans its steps what the simulation stands on."""
+    def _begin_walk(self, options: Mapping[str, Any]) -> None:
+        """Tell the controller what it stands on, where it plans its steps, and its commands."""
         terrain, walker = self.simulation.robot.terrain, self._walker
         if isinstance(walker, TerrainWalker) and walker.terrain != terrain:
             walker.terrain = terrain
             self._unbind()
-
-    def _begin_walk(self, options: Mapping[str, Any]) -> None:
-        self._tell_terrain()
         commands = self._commands(options)
         if "command" in options:
             self._expect_orders("reset")
             for command in commands:
-                self._check_reach(command)
+                check_reach(walker, command)
         self._timetable.fill(commands)
         if self._orders is not None:
             follow_timetable(self._follower(self._orders))
@@ -126,7 +119,7 @@ class CommandedEnv(BalanceEnv):
         return Follower(self._timetable, clock, self.arrays.timestep, orders)
 
 
-def check_reach(walker: WalkingController, command: GaitCommand) -> None:
+def check_reach(walker: WalkingController | None, command: GaitCommand) -> None:
     """Raise ConfigError for a command out of the reach of a controller that knows its limits."""
     if isinstance(walker, LimitedWalker):
         walker.check_command(command)

@@ -16,7 +16,7 @@ from poise.baselines.controller import (
 from poise.baselines.walking.schedule import follow_timetable
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_steps
-from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, StepEnd, judge_step
+from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, Program, address_of
 from poise.envs.compiled.memory import guarded_zeros
@@ -127,12 +127,8 @@ class ControlledEnv(CommandedEnv):
             ticks=self.ticks,
             substeps=self.control_substeps,
             episode=self.episode,
-            end=self._end_of_tick(tick),
+            end=replace(self.step_end(), report=Program.of(self._reports(tick))),
         )
-
-    def _end_of_tick(self, tick: Block) -> StepEnd:
-        """The end of a policy step of the controller whose compiled tick works on `tick`."""
-        return replace(self.step_end(), report=Program.of(self._reports(tick)))
 
     def _reports(self, tick: Any) -> list[tuple[Callable[..., None], Block]]:
         """The kernels that follow a judged policy step, before it is observed."""
@@ -179,13 +175,10 @@ class ControlledEnv(CommandedEnv):
         sim.step(ctrl, self.control_substeps)
         source.update()
         e.ticks[0] += 1
-        if e.ticks[0] == self.ticks:
-            self._end_in_python()
-
-    def _end_in_python(self) -> None:
-        """End the policy step, as `end_tick` does."""
-        self.episode.ticks[0] = 0
-        self.episode.metrics[FAILURES] = self._base.failures
+        if e.ticks[0] != self.ticks:
+            return
+        e.ticks[0] = 0  # the end of the policy step, as of `end_tick`
+        e.metrics[FAILURES] = self._base.failures
         judge_step(self.step_end().judge)
         if self._orders is not None:
             follow_timetable(self._follower(self._orders))

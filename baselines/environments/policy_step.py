@@ -114,9 +114,7 @@ def set_targets(a: TargetInputs):
     """Targets of this tick."""
     now, motion = a.clock[0] * a.robot.timestep, a.motion
     time = played_time(motion.pace, a.state, a.targets.com, motion.knots[0], now)
-    update_targets(
-        a.robot, a.state, motion, time, a.com_offset, a.residual.offsets, a.targets
-    )  # fmt: skip
+    update_targets(a.robot, a.state, motion, time, a.com_offset, a.residual.offsets, a.targets)
 
 
 @dataclass(frozen=True, eq=False)

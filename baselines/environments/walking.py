@@ -105,10 +105,6 @@ class ResidualWalkEnv(ResidualStepEnv):
         self.walker = walker  #: the controller that walks, of which `controller` may be a wrapper
 
     def arguments(self) -> dict[str, Any]:
-        """The arguments that make another environment like this one; robot and motion are shared.
-
-        Raises ConfigError as `ResidualBalanceEnv` does.
-        """
         return {**super().arguments(), "command": self.command_sampler}
 
     def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:

@@ -110,10 +110,6 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         return float(self._memory[AUTHORITY])
 
     def arguments(self) -> dict[str, Any]:
-        """The arguments that make another environment like this one; robot and motion are shared.
-
-        Raises ConfigError as `ResidualBalanceEnv` does.
-        """
         own = {"servos": self.servo_config, "hand_over": self.hand_over}
         return {**super().arguments(), **own}
 

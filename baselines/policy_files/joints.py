@@ -46,32 +46,27 @@ def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
     """
     index = _index(robot, config)
     n, names = len(index), [robot.joint_names[i] for i in index]
-    places = config.action_joints or tuple(range(n))
+    places = list(config.action_joints or range(n))
     if max(places, default=0) >= n or len(set(places)) < len(places):
         raise _wrong(config, "action_joints", f"must be different places in {n} joints")
     default = _spread(config.default, names, "default", config)
-    offset = default
+    na, moved, offset = len(places), index[places], default[places]
     if config.action_offset is not None:
-        moved_names = [names[i] for i in places]
-        offset_moved = _spread(config.action_offset, moved_names, "action_offset", config)
-    else:
-        offset_moved = offset[list(places)]
-    na = len(places)
+        offset = _spread(config.action_offset, [names[i] for i in places], "action_offset", config)
     bounds = np.tile([-np.inf, np.inf], (na, 1))
     if config.action_clip:
         if len(config.action_clip) not in (1, na):
             raise _wrong(config, "action_clip", f"has {len(config.action_clip)} pairs for {na}")
         bounds = np.broadcast_to(np.array(config.action_clip), (na, 2))
-    simulation = Simulation(robot)
-    inertia = np.diag(simulation.state.M)[6:]
+    inertia = np.diag(Simulation(robot).state.M)[6:]
     stiffness, damping = config.hold**2 * inertia, 2.0 * config.hold * inertia
     stiffness[index] = _spread(config.stiffness, names, "stiffness", config)
     damping[index] = _spread(config.damping, names, "damping", config)
     target = robot.standing_qpos[7:].copy()
     target[index] = default
-    target[index[list(places)]] = offset_moved
+    target[moved] = offset
     servos = JointServos(
-        index, index[list(places)], default, offset_moved,
+        index, moved, default, offset,
         _spread(config.action_scale, names[:na], "action_scale", config), bounds, stiffness,
         damping, target, np.zeros((na, 4)),
     )  # fmt: skip

@@ -55,10 +55,8 @@ def places(origin: Origin) -> list[Path]:
     the repository of Poise; ``shared/rivals`` beside the latter.
     """
     named = [Path(each) for each in os.environ.get(PLACES, "").split(os.pathsep) if each]
-    project, beside = (
-        origin.project.rpartition("/")[2],
-        packaged_folder(RIVALS).resolve().parents[2],
-    )
+    project = origin.project.rpartition("/")[2]
+    beside = packaged_folder(RIVALS).resolve().parents[2]
     folders = [*named, Path.cwd() / project, beside / project, beside / SHARED]
     return [folder for folder in dict.fromkeys(folders) if is_folder(folder)]
 

@@ -216,10 +216,8 @@ class ScriptNetwork:
 
         buffer = io.BytesIO()
         torch.jit.save(self._module, buffer)
-        return (
-            _with_module,
-            (self.content, self.path, self.config, buffer.getvalue(), self._memory),
-        )
+        given = self.content, self.path, self.config, buffer.getvalue(), self._memory
+        return _with_module, given
 
     def reset(self) -> None:
         import torch

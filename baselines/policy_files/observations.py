@@ -105,7 +105,6 @@ class _Side:
         return np.concatenate([part.now(seen) for part in self.parts])
 
     def forget(self) -> None:
-        """Forget the last trial."""
         for part in self.parts:
             part.forget()
 
@@ -146,6 +145,5 @@ class _Part:
         return np.concatenate(steps[::-1] if own.newest_first else steps)
 
     def forget(self) -> None:
-        """Forget the last trial."""
         self.kept.clear()
         self.inner.forget()

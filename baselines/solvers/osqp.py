@@ -98,9 +98,8 @@ class OSQPSolver:
     def _load(self, qp: QP, scale: np.ndarray) -> osqp.OSQP:
         """The workspace with this problem in it, its rows scaled."""
         m, n = qp.C.shape
-        upper = qp.H[
-            np.tril_indices(n)
-        ]  # row by row of one triangle, column by column of the other
+        # row by row of one triangle, column by column of the other
+        upper = qp.H[np.tril_indices(n)]
         rows = (scale[:, None] * qp.C).ravel(order="F")
         l, u = scale * qp.l, scale * qp.u  # noqa: E741
         if self._solver is not None and (self._solver.m, self._solver.n) == (m, n):

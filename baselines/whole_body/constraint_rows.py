@@ -39,12 +39,6 @@ def sole_motion(state: RobotState, p: QPParameters) -> Bounds:
     return Bounds(state.J, accel, accel)
 
 
-def point_motion_bounds(points: Sequence[ContactRows]) -> Bounds:
-    """J v̇ + J̇ v = what each point in contact is to have."""
-    accel = np.concatenate([point.accel for point in points])
-    return Bounds(np.vstack([point.J for point in points]), accel, accel)
-
-
 def contact_motion(
     state: RobotState, p: QPParameters, points: Sequence[ContactRows] = ()
 ) -> tuple[Bounds, Rows]:
@@ -52,8 +46,8 @@ def contact_motion(
 
     These are none, or the weakest row of J on legs of fewer than six joints (`null_space.py`).
     """
-    parts = [sole_motion(state, p), *([point_motion_bounds(points)] if points else [])]
-    J, accel = np.vstack([part.C for part in parts]), np.concatenate([part.l for part in parts])
+    J = contact_jacobian(state, points)
+    accel = np.concatenate([sole_motion(state, p).l, *(point.accel for point in points)])
     weak = np.zeros(len(J), dtype=bool)
     if len(state.J) > 6 and p.weakest_weight.any():
         weak[weakest_row(J)] = True
@@ -76,7 +70,8 @@ def weakest_row(J: np.ndarray) -> int:
 
 def point_cones(state: RobotState, points: Sequence[ContactRows]) -> Bounds:
     """cone · f ≤ bound of each point in contact."""
-    C = _after(len(state.qvel) + len(state.J), block_diag(*(point.cone for point in points)))
+    columns = len(state.qvel) + len(state.J)
+    C = np.pad(block_diag(*(point.cone for point in points)), ((0, 0), (columns, 0)))
     return Bounds(C, np.full(len(C), -np.inf), np.concatenate([point.bound for point in points]))
 
 
@@ -91,7 +86,7 @@ def sole_cones(state: RobotState, p: QPParameters) -> Bounds:
         (cone * narrower) @ block_diag(axes.T, axes.T)
         for cone, axes in zip(p.cone, state.sole_axes, strict=True)
     ]
-    C = _after(len(state.qvel), block_diag(*cones))
+    C = np.pad(block_diag(*cones), ((0, 0), (len(state.qvel), 0)))
     return Bounds(C, np.full(len(C), -np.inf), np.zeros(len(C)))
 
 
@@ -138,11 +133,6 @@ def _root_force_matrix(state: RobotState) -> np.ndarray:
     arm = np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
     R = state.root_axes
     return np.block([[np.eye(3), np.zeros((3, 3))], [R.T @ arm, R.T]])
-
-
-def _after(columns: int, matrix: np.ndarray) -> np.ndarray:
-    """`matrix` behind this many columns of zeros."""
-    return np.hstack([np.zeros((len(matrix), columns)), matrix])
 
 
 def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:

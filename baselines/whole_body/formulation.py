@@ -124,16 +124,11 @@ def assemble(tasks: Sequence[Rows], constraints: Sequence[Bounds], n: int) -> QP
     """H = Σ Aᵀ W A, g = −Σ Aᵀ W b, and the constraints one below the other, for n unknowns."""
     H, g = np.zeros((n, n)), np.zeros(n)
     for task in tasks:
-        A = _widened(task.A, n)
+        A = np.pad(task.A, ((0, 0), (0, n - task.A.shape[1])))
         weighted = task.weights[:, None] * A
         H += A.T @ weighted
         g -= task.b @ weighted
-    C = np.vstack([_widened(bounds.C, n) for bounds in constraints])
+    C = np.vstack([np.pad(each.C, ((0, 0), (0, n - each.C.shape[1]))) for each in constraints])
     l = np.concatenate([bounds.l for bounds in constraints])  # noqa: E741
     u = np.concatenate([bounds.u for bounds in constraints])
     return QP(0.5 * (H + H.T), g, C, l, u)
-
-
-def _widened(matrix: np.ndarray, n: int) -> np.ndarray:
-    """`matrix` with columns of zeros up to n."""
-    return np.hstack([matrix, np.zeros((len(matrix), n - matrix.shape[1]))])

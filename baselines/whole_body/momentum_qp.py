@@ -91,7 +91,6 @@ class MomentumQP(CompiledController):
 
     @property
     def failures(self) -> int:
-        """Ticks since the reset at which the QP was not solved."""
         return int(self.memory.failures[0])
 
     @property
@@ -142,7 +141,6 @@ class MomentumQP(CompiledController):
         return self.parameters
 
     def outputs(self) -> Outputs:
-        """The arrays in which a tick leaves its results."""
         ws, p = self.workspace, self.parameters
         return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root, ws.vdot)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,76 +12,23 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, sole_chains
 
 
-class Layout(NamedTuple):
-    """Sizes of a reduced problem, and where the parts of its arrays begin.
-
-    Unknowns x = (z, y, f, u): what is left of v̇, internal wrenches of the soles, forces of the
-    point contacts, a soft root's wrench. Affine in x are `rows` = (v̇, W, w, τ), see `Workspace`.
-    Constraints are the soles' cones, the points' cones, torque limits, joint limits and further
-    limits.
-    """
-
-    nv: int
-    nj: int  # joints: nv − 6
-    k: int  # contact forces and moments: six a sole, three a point
-    n: int  # unknowns
-    first_internal: int
-    first_force: int
-    first_root: int
-    r: int  # rows
-    m: int  # constraints
-    first_point: int
-    first_torque: int
-    first_joint: int
-
-    @property
-    def parts(self) -> tuple[slice, slice, slice, slice]:
-        """The parts v̇, W, w and τ of `rows`."""
-        nv, k = self.nv, self.k
-        return slice(0, nv), slice(nv, nv + 6), slice(nv + 6, nv + 6 + k), slice(nv + 6 + k, self.r)
-
-
-def lay_out(
-    robot: RobotArrays,
-    space: NullSpace,
-    cone_rows: int,
-    soft_root: bool,
-    points: int,
-    rows: int,
-    limits: int,
-) -> Layout:
-    """Return the layout for a robot whose soles' cones have `cone_rows` rows each.
-
-    So many `points` are in contact, whose cones have so many `rows` together; further limits have
-    so many rows as `limits`.
-    """
-    nj, nc = len(robot.q_standing), len(robot.sole_body)
-    nv, k = nj + 6, 6 * nc + 3 * points
-    first_internal = nv - len(space.beta) + space.spare
-    first_force = first_internal + 6 * (nc - 1)
-    first_root = first_force + 3 * points
-    first_point = nc * cone_rows
-    first_torque = first_point + rows
-    return Layout(
-        nv=nv, nj=nj, k=k, n=first_root + (6 if soft_root else 0), first_internal=first_internal,
-        first_force=first_force, first_root=first_root, r=nv + 6 + k + nj,
-        m=first_torque + 2 * nj + limits, first_point=first_point, first_torque=first_torque,
-        first_joint=first_torque + nj,
-    )  # fmt: skip
-
-
 @dataclass(frozen=True, eq=False)
 class Workspace(Block):
     """Scratch of the reduced problem; `H`, `g`, `C`, `l`, `u` are the QP after `assemble`.
+
+    Unknowns x = (z, y, f, u): what is left of v̇, internal wrenches of the soles, forces of the
+    point contacts, a soft root's wrench. Constraints are the soles' cones, the points' cones,
+    torque limits, joint limits and further limits. `first_…` is where a part of these begins.
+    There are nj = nv − 6 joints, and k contact forces and moments: six a sole, three a point.
 
     v̇, the total wrench W, the contact wrenches w and the joint torques τ are affine in x:
     V x + v̇₀, B x + W₀, E x + w₀, T x + τ₀. They lie one below the other in `rows` and `offsets`.
     """
 
-    first_internal: int  # see `Layout`
-    first_force: int
-    first_root: int
-    first_point: int
+    first_internal: int  # unknown y
+    first_force: int  # unknown f
+    first_root: int  # unknown u
+    first_point: int  # constraint: those before are the soles'
     first_torque: int
     first_joint: int
     rows: np.ndarray  # (r, n)
@@ -156,25 +102,32 @@ def allocate_workspace(
         limit_rows: how many rows there are of limits besides those of torques and joints.
     """
     space = allocate_null_space(len(robot.q_standing) + 6, sole_chains(robot), point_chains)
-    points = len(point_chains)
-    lay = lay_out(robot, space, cone_rows, soft_root, points, point_rows, limit_rows)
-    n, m, r, k, nj, z = lay.n, lay.m, lay.r, lay.k, lay.nj, guarded_zeros
+    points, nj, nc = len(point_chains), len(robot.q_standing), len(robot.sole_body)
+    nv, k = nj + 6, 6 * nc + 3 * points
+    first_internal = nv - len(space.beta) + space.spare
+    first_force = first_internal + 6 * (nc - 1)
+    first_root = first_force + 3 * points
+    first_point = nc * cone_rows
+    first_torque = first_point + point_rows
+    first_joint = first_torque + nj
+    n, m = first_root + (6 if soft_root else 0), first_joint + nj + limit_rows
+    r, z = nv + 6 + k + nj, guarded_zeros
     rows, offsets, desired, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
-    V, B, E, T = lay.parts
+    V, B, E, T = slice(nv), slice(nv, nv + 6), slice(nv + 6, r - nj), slice(r - nj, r)
     for i in range(3 * points):  # the forces of points are unknowns themselves
-        rows[E][i - 3 * points, lay.first_force + i] = 1.0
+        rows[E][i - 3 * points, first_force + i] = 1.0
     ws = Workspace(
-        first_internal=lay.first_internal, first_force=lay.first_force, first_root=lay.first_root,
-        first_point=lay.first_point, first_torque=lay.first_torque, first_joint=lay.first_joint,
+        first_internal=first_internal, first_force=first_force, first_root=first_root,
+        first_point=first_point, first_torque=first_torque, first_joint=first_joint,
         rows=rows, offsets=offsets, desired=desired, weights=weights,
         weighted=z((r, n)), values=values, V=rows[V], B=rows[B], E=rows[E], T=rows[T],
         vdot0=offsets[V], W0=offsets[B], w0=offsets[E], tau0=offsets[T],
         accel_des=desired[V], wrench_des=desired[B], force_des=desired[E],
         accel_weights=weights[V], momentum_weights=weights[B], force_weights=weights[E],
         torque_weights=weights[T], space=space,
-        sole_accel=z(6 * len(robot.sole_body)),
+        sole_accel=z(6 * nc),
         contact_accel=z(k), y=z(6), cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6),
-        BBt=z((6, 6)), JtE=z((lay.nv, n)), local=z((6, n)), local0=z(6),
+        BBt=z((6, 6)), JtE=z((nv, n)), local=z((6, n)), local0=z(6),
         H=z((n, n)), g=z(n), C=z((m, n)), l=z(m), u=z(m), x=z(n), lam=z(m),
         scratch=z(scratch_size(n, m)), iscratch=z(iscratch_size(n, m), dtype=np.int64),
         status=z(1, dtype=np.int64), vdot=values[V], wrenches=values[E], tau_asked=values[T],

@@ -133,11 +133,8 @@ def contact_arrays(
     soles, nv = state.J.shape
     ends = np.cumsum([0, *(each.contact.cone_rows for each in points)])
     J = guarded_zeros((soles + 3 * len(points), nv)) if points else state.J
-    positions, cone, bound = (
-        guarded_zeros((len(points), 3)),
-        guarded_zeros((int(ends[-1]), 3)),
-        guarded_zeros(int(ends[-1])),
-    )
+    positions, cone = guarded_zeros((len(points), 3)), guarded_zeros((int(ends[-1]), 3))
+    bound = guarded_zeros(len(cone))
     calls = []
     for i, (contact, block) in enumerate(points):
         assert accel is not None and weights is not None and force is not None

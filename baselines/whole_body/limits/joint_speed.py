@@ -53,7 +53,6 @@ class JointSpeed(Limit[JointSpeedBlock]):
     floor: float = field(default=20.0, metadata={"above": 0.0})  #: in ω²
 
     def bind(self, robot: Robot) -> JointSpeedBlock:
-        """Return the limit in SI units."""
         joints, omega = joint_indices(robot, self.joints), robot.units.omega
         return JointSpeedBlock(
             joints=joints, largest=np.full(len(joints), self.largest * omega),
@@ -61,7 +60,6 @@ class JointSpeed(Limit[JointSpeedBlock]):
         )  # fmt: skip
 
     def size(self, block: JointSpeedBlock) -> int:
-        """Return the number of joints."""
         return len(block.joints)
 
     def rows(self, state: RobotState, block: JointSpeedBlock, torques: np.ndarray) -> Bounds:

@@ -44,13 +44,11 @@ class Torque(Limit[TorqueBlock]):
     share: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})  #: of τ_max
 
     def bind(self, robot: Robot) -> TorqueBlock:
-        """Return the limit in SI units."""
         largest, joints = np.zeros(len(robot.joint_names)), joint_indices(robot, self.joints)
         largest[robot.motor_dofs - 6] = self.share * robot.torque_limit
         return TorqueBlock(joints=joints, largest=largest[joints])
 
     def size(self, block: TorqueBlock) -> int:
-        """Return the number of joints."""
         return len(block.joints)
 
     def rows(self, state: RobotState, block: TorqueBlock, torques: np.ndarray) -> Bounds:

@@ -85,7 +85,6 @@ class Orientation(Task[OrientationBlock]):
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: OrientationBlock) -> Rows:
-        """The rows in v̇, in NumPy."""
         motion = point_motion(state, block.point)
         yaw = state.heading_yaw if block.turns else 0.0
         desired = Rotation.from_euler("z", yaw).as_matrix() @ block.axes

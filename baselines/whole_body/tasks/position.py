@@ -105,7 +105,6 @@ class Position(Task[PositionBlock]):
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: PositionBlock) -> Rows:
-        """The rows in v̇, in NumPy."""
         motion = point_motion(state, block.point)
         place, velocity, accel = block.reference
         if block.turns:

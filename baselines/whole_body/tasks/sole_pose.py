@@ -67,12 +67,8 @@ class SolePose(Task[SolePoseBlock]):
     kernel = staticmethod(fill_sole_pose)
 
     def rows(self, state: RobotState, block: SolePoseBlock) -> Rows:
-        """The rows in v̇, in NumPy."""
-        own, gains, reference = (
-            slice(6 * block.sole, 6 * block.sole + 6),
-            block.gains,
-            block.reference,
-        )
+        gains, reference = block.gains, block.reference
+        own = slice(6 * block.sole, 6 * block.sole + 6)
         velocity, axes = state.J_v[own], state.sole_axes[block.sole]
         turn = 0.5 * np.cross(axes.T, block.axes.T).sum(axis=0)
         error = np.concatenate([reference[0] - state.sole_points[block.sole], turn])

@@ -89,14 +89,7 @@ def bind_tasks(tasks: Mapping[str, Task], robot: Robot) -> dict[str, BoundTask]:
     return bound
 
 
-class Spring(NamedTuple):
-    """Stiffness k [1/s²] and damping d = 2 ζ √k [1/s] of a task."""
-
-    k: float
-    d: float
-
-
-def spring(units: Units, stiffness: float, damping_ratio: float) -> Spring:
-    """Return k and d in SI units, from a stiffness in ω² and a damping ratio ζ."""
+def spring(units: Units, stiffness: float, damping_ratio: float) -> tuple[float, float]:
+    """k [1/s²] and d = 2 ζ √k [1/s], from a stiffness in ω² and a damping ratio ζ."""
     k = stiffness * units.omega**2
-    return Spring(float(k), float(2.0 * damping_ratio * np.sqrt(k)))
+    return float(k), float(2.0 * damping_ratio * np.sqrt(k))
