@@ -1,28 +1,19 @@
-"""What the legs do while they stand: the knee's torque, the ground's force, the CoM's height."""
+"""Stances: the knee's torque, the ground's force, the CoM's height; the human knee beside them."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
 
 import numpy as np
 
 from poise.baselines.walking.models.legs import leg_arrays
+from poise.configs.files import resolve
+from poise.configs.schema import build, read_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.trials.gait_record import knee_motors
 
-from .human import POINTS
-
+POINTS = 51  # of a curve over stance
 SHORTEST = 0.1  # [s] that a foot is down: a stance
-
-
-class Row(NamedTuple):
-    """The end of a policy step."""
-
-    time: float  # [s]
-    down: np.ndarray  # (2,) whether a foot touches the ground
-    knees: np.ndarray  # (2,) τ/m [N·m/kg], extension positive
-    force: float  # vertical force of the ground, in m g
-    height: float  # of the CoM over the soles' middle [m]
 
 
 @dataclass(frozen=True)
@@ -47,19 +38,19 @@ class StanceRecord:
     def __init__(self, robot: Robot) -> None:
         self._signs = -leg_arrays(robot).knee_sign  # extension is what brings the flexion down
         self._motors: list[int] = []
-        self._rows: list[Row] = []
+        self._rows: list[tuple[object, ...]] = []
 
     def __call__(self, env: BalanceEnv) -> None:
-        """Keep a row."""
+        """Keep a row: the time [s], (2,) which feet are down, (2,) τ/m of the knees [N·m/kg], the
+        vertical force of the ground in m g, and the height of the CoM over the soles' middle [m].
+        """
         if not self._rows:
             self._motors = [motor for motor in knee_motors(env) if motor is not None]
         state, robot = env.simulation.state, env.robot
         torques = self._signs * env.simulation.views.ctrl[self._motors] / robot.mass
         force = state.arrays.contact_wrench[2] / (robot.mass * robot.units.gravity)
-        height = float(state.com[2] - state.origin[2])
-        self._rows.append(
-            Row(env.simulation.time, state.contacts > 0.5, torques, float(force), height)
-        )
+        down, height = state.contacts > 0.5, float(state.com[2] - state.origin[2])
+        self._rows.append((env.simulation.time, down, torques, float(force), height))
 
     def stances(self, since: float) -> Stances:
         """The whole stances that begin `since` [s] or later."""
@@ -90,3 +81,39 @@ def _spans(down: np.ndarray, time: np.ndarray, since: float) -> list[tuple[int, 
 def _resampled(values: np.ndarray) -> np.ndarray:
     """(51,) values over a stance whose time is normalised."""
     return np.interp(np.linspace(0.0, 1.0, POINTS), np.linspace(0.0, 1.0, len(values)), values)
+
+
+@dataclass(frozen=True)
+class KneeMoment:
+    """The knee's moment in the sagittal plane, extension positive, at points of stance.
+
+    Attributes:
+        source: where the figures are from.
+        stance: rising from 0 to 100 [%].
+        mean: [N·m/kg].
+        half_width: of the band [N·m/kg].
+    """
+
+    source: str
+    stance: tuple[float, ...]
+    mean: tuple[float, ...]
+    half_width: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not len(self.stance) == len(self.mean) == len(self.half_width) >= 2:
+            raise ValueError("stance: must be as long as mean and half_width, two points or more")
+        if self.stance[0] != 0.0 or self.stance[-1] != 100.0 or np.any(np.diff(self.stance) <= 0):
+            raise ValueError("stance: must rise from 0 to 100")
+        if min(self.half_width) < 0.0:
+            raise ValueError("half_width: must not be negative")
+
+    def curves(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and half width (51,) [N·m/kg] at every 2 % of stance, linear between the points."""
+        at = np.linspace(0.0, 100.0, POINTS)
+        return np.interp(at, self.stance, self.mean), np.interp(at, self.stance, self.half_width)
+
+
+def load_knee_moment(name: str | Path = "knee-moment") -> KneeMoment:
+    """A packaged band, or that of a YAML file; raises ConfigError for one that is not valid."""
+    path = resolve("human", name)
+    return build(KneeMoment, read_yaml(path), path)
