@@ -66,7 +66,8 @@ def open_synthesis(
                                   source=file, field=f"clips.{told.name}")  # fmt: skip
         return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
                          robot_joins=joins)  # fmt: skip
-    names, steps = packaged_clips(), []
+    names = packaged_clips()
+    steps: list[str] = []
     if robot is not None:  # clips whose feet stay; of those whose feet move the motion, if any
         walks, motions = [name for name in names if name.endswith("_walk")], motions_with_steps()
         moving = ("_walk", *(f"_{motion}" for motion in motions))
