@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,16 @@ from poise.training.benchmarking.trials.gait_record import knee_motors
 
 POINTS = 51  # of a curve over stance
 SHORTEST = 0.1  # [s] that a foot is down: a stance
+
+
+class Row(NamedTuple):
+    """The end of a policy step."""
+
+    time: float  # [s]
+    down: np.ndarray  # (2,) whether a foot touches the ground
+    knees: np.ndarray  # (2,) τ/m [N·m/kg], extension positive
+    force: float  # vertical force of the ground, in m g
+    height: float  # of the CoM over the soles' middle [m]
 
 
 @dataclass(frozen=True)
@@ -38,19 +49,17 @@ class StanceRecord:
     def __init__(self, robot: Robot) -> None:
         self._signs = -leg_arrays(robot).knee_sign  # extension is what brings the flexion down
         self._motors: list[int] = []
-        self._rows: list[tuple[object, ...]] = []
+        self._rows: list[Row] = []
 
     def __call__(self, env: BalanceEnv) -> None:
-        """Keep a row: the time [s], (2,) which feet are down, (2,) τ/m of the knees [N·m/kg], the
-        vertical force of the ground in m g, and the height of the CoM over the soles' middle [m].
-        """
+        """Keep a row."""
         if not self._rows:
             self._motors = [motor for motor in knee_motors(env) if motor is not None]
         state, robot = env.simulation.state, env.robot
         torques = self._signs * env.simulation.views.ctrl[self._motors] / robot.mass
         force = state.arrays.contact_wrench[2] / (robot.mass * robot.units.gravity)
         down, height = state.contacts > 0.5, float(state.com[2] - state.origin[2])
-        self._rows.append((env.simulation.time, down, torques, float(force), height))
+        self._rows.append(Row(env.simulation.time, down, torques, float(force), height))
 
     def stances(self, since: float) -> Stances:
         """The whole stances that begin `since` [s] or later."""
