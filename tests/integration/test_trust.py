@@ -31,10 +31,9 @@ from poise.envs.compiled import warmup
 from poise.training.benchmarking.evaluation.evaluate import benchmark, evaluate
 from poise.training.benchmarking.metrics.seed_groups import seed_groups
 from poise.training.benchmarking.results.compare import compare
-from poise.training.benchmarking.results.film import film
 from poise.training.benchmarking.results.leaderboard import write_leaderboard
 from poise.training.benchmarking.results.read import load_results
-from poise.training.benchmarking.results.replay import replay
+from poise.training.benchmarking.results.replay import film, replay
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.benchmarking.trials.jobs import Job, Stage, play
 from poise.training.cli.entry import main

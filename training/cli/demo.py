@@ -9,8 +9,8 @@ from rich.console import Console
 
 from poise.configs.errors import PoiseError
 from poise.training.benchmarking.evaluation.evaluate import evaluate
-from poise.training.benchmarking.results.film import film
 from poise.training.benchmarking.results.read import Results, load_results
+from poise.training.benchmarking.results.replay import film
 from poise.training.running.files import PLOTS
 from poise.training.running.stopping import keeps
 from poise.training.running.summary import Summary

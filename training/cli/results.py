@@ -91,8 +91,7 @@ def replay(
     from poise.configs.outputs import check_out_file
 
     check_folders(folder)
-    from poise.training.benchmarking.results.film import film
-    from poise.training.benchmarking.results.replay import replay
+    from poise.training.benchmarking.results.replay import film, replay
 
     for file, field in ((video, "video"), (plot, "plot")):
         if file is not None:

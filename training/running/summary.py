@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal, TypedDict
 
 from poise.configs.errors import ConfigError, shown
-from poise.training.benchmarking.statistics.seeds import SeedFigures
+from poise.training.benchmarking.statistics.rates import SeedFigures
 
 from .provenance import Circumstances
 

@@ -1,4 +1,4 @@
-"""training/cli/demo.py, and training/benchmarking/results/film.py, which it ends with."""
+"""training/cli/demo.py, and training/benchmarking/results/replay.py, which it ends with."""
 
 from __future__ import annotations
 

@@ -116,7 +116,8 @@ def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
         return {}
     row = lasting[:, 0].min()
     motors = lasting[lasting[:, 0] == row, 1]
-    lengths = {int(motor): _length(full[row:, motor]) for motor in motors}
+    # rows until each is no longer full
+    lengths = {int(motor): int(np.argmin([*full[row:, motor], False])) for motor in motors}
     motor = max(lengths, key=lambda each: lengths[each])
     period = env.config.policy_period
     return {
@@ -137,12 +138,6 @@ def bearing(robot: Robot) -> np.ndarray:
             body = int(model.body_parentid[body])
     bodies = model.dof_bodyid[np.array(robot.motor_dofs)]
     return np.isin(bodies, list(between))
-
-
-def _length(full: np.ndarray) -> int:
-    """Rows until a motor is no longer full."""
-    ends = np.flatnonzero(~full)
-    return int(ends[0]) if len(ends) else len(full)
 
 
 def _capture(course: Course) -> dict[str, Any]:

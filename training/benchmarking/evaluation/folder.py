@@ -85,29 +85,21 @@ class ResultFolder:
         check_out_folder(path)
         self._lock = FolderLock(path)
         try:
-            self._open(overwrite, closed, ready)
+            if overwrite:
+                for name in (*FILES, REPORT):
+                    (path / name).unlink(missing_ok=True)
+            elif holds_files(path):
+                controllers = {**self._check(closed).controllers, **settings.controllers}
+                self.settings = replace(settings, controllers=controllers)
+                self.finished, self.damaged = read_outcomes(path)
+            if ready is not None:
+                ready(self.settings)
+            write_atomic(path / SETTINGS, to_yaml(self.settings))
+            entries = {key: asdict(outcome) for key, outcome in self.finished.items()}
+            self._log = TrialLog(path / LOG, entries)
         except BaseException:
             self._lock.release()
             raise
-
-    def _open(
-        self, overwrite: bool, closed: bool, ready: Callable[[Settings], object] | None
-    ) -> None:
-        path, settings = self.path, self.settings
-        if overwrite:
-            for name in (*FILES, REPORT):
-                (path / name).unlink(missing_ok=True)
-        elif holds_files(path):
-            before = self._check(closed)
-            self.settings = replace(
-                settings, controllers={**before.controllers, **settings.controllers}
-            )
-            self.finished, self.damaged = read_outcomes(path)
-        if ready is not None:
-            ready(self.settings)
-        write_atomic(path / SETTINGS, to_yaml(self.settings))
-        entries = {key: asdict(outcome) for key, outcome in self.finished.items()}
-        self._log = TrialLog(path / LOG, entries)
 
     def append(self, controller: str, number: int, outcome: Outcome) -> None:
         """Keep the outcome of a trial; raises PoiseError when the disk refuses."""

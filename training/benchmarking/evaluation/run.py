@@ -14,6 +14,7 @@ from typing import Any
 from rich.console import Console
 
 from poise.baselines.allowance import allowing
+from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
@@ -31,9 +32,9 @@ from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import (
     Agent,
     can_walk,
-    check_follows,
     check_may_walk,
     check_walks,
+    follows_no_motion,
 )
 from poise.training.benchmarking.trials.jobs import Job, play
 from poise.training.benchmarking.trials.names import check_name
@@ -108,12 +109,11 @@ class Run:
         prepare()
         self.stage = suite_stage(self.suite, robot, self.out)
         self.agents = {name: self.stage.load(name, self.robot) for name in names}
-        if self.suite.walks:
-            for name, agent in self.agents.items():
+        for name, agent in self.agents.items():
+            if self.suite.walks:
                 check_walks(name, agent, f"suite {suite}")
-        if self.suite.motions is not None:
-            for name, agent in self.agents.items():
-                check_follows(name, agent, f"suite {suite}")
+            if self.suite.motions is not None and not isinstance(agent.env, ResidualBalanceEnv):
+                raise follows_no_motion(name, f"suite {suite}")
         self.settings = Settings(
             **known,
             limits=self.limits.table,
@@ -131,7 +131,11 @@ class Run:
         keeps(self.out / LOG, f"the finished trials are kept in {self.out}; "
               "the same command goes on")  # fmt: skip
         with closing(folder):
-            self._announce(folder)
+            if folder.damaged:
+                self.console.print(f"{folder.damaged} lines of {self.out} could not be read: "
+                                   "played again")  # fmt: skip
+            if folder.finished:
+                self.console.print(f"going on after {len(folder.finished)} finished trials")
             self.repertoire.write(self.out)
             names = tuple(folder.settings.controllers)
             agents = {name: self.agents[name] for name in names}
@@ -200,13 +204,6 @@ class Run:
         if suite.realism != IDEAL:
             whole["realism"] = suite.realism
         return plain(whole)
-
-    def _announce(self, folder: ResultFolder) -> None:
-        if folder.damaged:
-            self.console.print(f"{folder.damaged} lines of {self.out} could not be read: "
-                               "played again")  # fmt: skip
-        if folder.finished:
-            self.console.print(f"going on after {len(folder.finished)} finished trials")
 
     def _load_others(self, settings: Settings) -> None:
         """Load what the folder has besides; raises ConfigError for one that has changed."""

@@ -108,9 +108,8 @@ def print_summary(summary: Summary, console: Console) -> None:
         console.print(each)
     if summary["pairs"]:
         console.print(_pairs(summary, console.width))
-    for line in _notes(summary, [heading for heading, _ in columns]):
-        console.print(line, markup=False, highlight=False)
-    for line in seed_lines(summary["seeds"]):
+    notes = _notes(summary, [heading for heading, _ in columns])
+    for line in (*notes, *seed_lines(summary["seeds"])):
         console.print(line, markup=False, highlight=False)
     for name, entry in summary["controllers"].items():
         if entry["errors"]:

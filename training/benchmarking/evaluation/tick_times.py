@@ -1,7 +1,6 @@
 """The time of a control tick is measured here, of all controllers in turn in one process."""
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 
@@ -49,7 +48,7 @@ class _Clock:
         self.ticks: list[float] = []
 
     def play(self, seed: int) -> None:
-        env, act = self.agent.env, self._timed(self.agent.act)
+        env = self.agent.env
         inner = env.controller if isinstance(env, ResidualBalanceEnv) else None
         try:
             clocked = None
@@ -58,7 +57,10 @@ class _Clock:
             push = {"specific_impulse": 0.2, "start": 0.05}
             observation, _ = env.reset(seed=seed, options={"push": push})
             for _ in range(round(SECONDS / env.config.policy_period)):
-                env.step_without_info(act(observation))
+                begun = time.perf_counter()
+                action = self.agent.act(observation)
+                self.acts.append(time.perf_counter() - begun)
+                env.step_without_info(action)
                 observation = env.episode.observation.astype(np.float32)
                 if env.fallen:
                     break
@@ -69,15 +71,6 @@ class _Clock:
         finally:
             if isinstance(env, ResidualBalanceEnv) and inner is not None:
                 env.controller = inner
-
-    def _timed(self, act: Callable[[np.ndarray], np.ndarray]) -> Callable:
-        def timed(observation: np.ndarray) -> np.ndarray:
-            begun = time.perf_counter()
-            action = act(observation)
-            self.acts.append(time.perf_counter() - begun)
-            return action
-
-        return timed
 
     def median(self) -> float | None:
         if self.broken or not self.acts:

@@ -1,25 +1,24 @@
 """A controller's entry of summary.json is computed here."""
 
-from collections.abc import Callable, Sequence
-
 import numpy as np
 
 from poise.training.benchmarking.diagnosis.words import losses
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
 from poise.training.benchmarking.statistics.eurobench import HUMAN_COM_HEIGHT
 from poise.training.benchmarking.statistics.fits import fit_logistic
-from poise.training.benchmarking.statistics.rates import eta, wilson_interval
+from poise.training.benchmarking.statistics.rates import eta
 from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.scenarios import PART as SCENARIOS
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit
 from poise.training.benchmarking.trials.trial import Outcome
 from poise.training.running.summary import (
-    Counts,
     Direction,
     Entry,
     EnvelopeFigures,
     Fractions,
     RobotFigures,
+    ScenarioFigures,
     Sector,
 )
 
@@ -30,16 +29,15 @@ from .played import (
     DIRECTIONAL,
     Played,
     ankle_limits,
+    counts,
     fractions,
     once,
     part,
     pushes,
-    rate,
     rated,
     sectors,
     won,
 )
-from .scenarios import scenario_figures
 from .walking import phase_figures, walk_levels
 
 
@@ -62,7 +60,7 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         entry["walks"] = walks
     if motions := motion_levels(played):
         entry["motions"], entry["in_motion"] = motions, in_motion(played)
-    if scenarios := scenario_figures(played, counts):
+    if scenarios := _scenarios(part(played, SCENARIOS)):
         entry["scenarios"] = scenarios
     if random := part(played, "random"):
         entry.update(_fractions(random, plan.limits))
@@ -71,50 +69,8 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
     if part(played, "envelope", "margin"):
         entry["eurobench"] = eurobench_figures(played, plan.limits)
     if plan.suite.levels:
-        entry["levels"] = level_figures(everything, plan.suite, counts)
+        entry["levels"] = level_figures(everything, plan.suite)
     return entry
-
-
-def counts(outcomes: Sequence[Outcome]) -> Counts:
-    """Counts of how trials ended, and medians of what was recorded."""
-    standing = [outcome for outcome in outcomes if outcome.recovered]
-    unpushed = [outcome for outcome in outcomes if outcome.com_drift is not None]
-    trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
-    stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
-
-    def over(
-        name: str, function: Callable[[list[float]], float], chosen: Sequence[Outcome] = outcomes
-    ) -> float | None:
-        values = [getattr(outcome, name) for outcome in chosen]
-        values = [value for value in values if value is not None]
-        return float(function(values)) if values else None
-
-    return {
-        **rate([outcome.recovered for outcome in outcomes]),
-        "fallen": fallen,
-        "never_fell_rate": stood / trials,
-        "never_fell_ci95": wilson_interval(stood, trials),
-        "recovered_with_step": sum(outcome.foot_displaced for outcome in standing),
-        "recovered_in_place": sum(o.steps == 0 and not o.foot_displaced for o in standing),
-        "steps_mean": over("steps", np.mean),
-        "steps_max": over("steps", np.max),
-        "solver_failures": sum(outcome.solver_failures for outcome in outcomes),
-        "solver_failures_recovered": sum(outcome.solver_failures for outcome in standing),
-        "recovery_time_median": over("recovery_time", np.median),
-        "max_com_median": over("max_com", np.median, standing),
-        "max_capture_median": over("max_capture", np.median, standing),
-        "min_cop_margin_median": over("min_cop_margin", np.median, standing),
-        "max_slide": over("max_slide", np.max, standing),
-        "energy_median": over("energy", np.median, standing),
-        "mean_power_median": over("mean_power", np.median, standing),
-        "torque_variation_median": over("torque_variation", np.median, standing),
-        "peak_torque_median": over("peak_torque", np.median),
-        "mean_abs_action": over("mean_abs_action", np.mean),
-        "mean_abs_action_max": over("mean_abs_action", np.max),
-        "com_drift_max": over("com_drift", np.max),
-        "foot_drift_max": over("foot_drift", np.max),
-        "unpushed_lean_max": over("final_lean", np.max, unpushed),
-    }
 
 
 def envelope(
@@ -185,6 +141,20 @@ def _fractions(played: Played, limits: PushLimits) -> Fractions:
         "fraction50_bound": fit.bound,
         "sectors": found,
     }
+
+
+def _scenarios(played: Played) -> list[ScenarioFigures]:
+    """Of each scenario that a controller has played, in the order of the suite."""
+    cells: dict[str, list[Outcome]] = {}
+    for trial, outcome in played:
+        cells.setdefault(str(trial.level), []).append(outcome)
+    found: list[ScenarioFigures] = []
+    for name, outcomes in cells.items():
+        figures: ScenarioFigures = {"scenario": name, **counts(outcomes)}
+        if speeds := [o.speed_ahead for o in outcomes if o.speed_ahead is not None]:
+            figures["speed_ahead"] = sum(speeds) / len(speeds)
+        found.append(figures)
+    return found
 
 
 def robot_figures(limits: PushLimits) -> RobotFigures:

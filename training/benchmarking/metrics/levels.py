@@ -1,24 +1,20 @@
 """Figures of a suite's parts at each level of realism."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
-from poise.training.benchmarking.statistics.differences import relative_gain
 from poise.training.benchmarking.suites.plan import at_level
 from poise.training.benchmarking.suites.suite import Suite
-from poise.training.benchmarking.trials.trial import Outcome
-from poise.training.running.summary import Counts, Interval, RealismLevel, both_ends
+from poise.training.running.summary import RealismLevel
 
-from .played import DIRECTIONAL, Played, part, pushes, won
+from .played import DIRECTIONAL, Played, counts, part, pushes, ratio, won
 
 RATED = ("random", "mix")  # parts that rates are of, where a suite has one
 
 
-def level_figures(
-    played: Played, suite: Suite, counts: Callable[[Sequence[Outcome]], Counts]
-) -> list[RealismLevel]:
-    """Of the suite's own level, then of each of its `levels`; `counts` of outcomes."""
+def level_figures(played: Played, suite: Suite) -> list[RealismLevel]:
+    """Of the suite's own level, then of each of its `levels`; J50 also over that of the first."""
 
     def named(names: Sequence[str], level: str | None) -> Played:
         return part(played, *(n if level is None else at_level(n, level) for n in names))
@@ -44,17 +40,8 @@ def level_figures(
             fit = mean_over_directions(direction, impulse, won(aimed))
             here["j50_mean"], here["j50_mean_ci95"] = fit.j50_mean, fit.j50_mean_ci
             if found:
-                here["j50_kept"], here["j50_kept_ci95"] = _kept(found[0], here)
+                first = found[0]["j50_mean"], found[0]["j50_mean_ci95"]
+                kept = ratio(*first, fit.j50_mean, fit.j50_mean_ci)
+                here["j50_kept"], here["j50_kept_ci95"] = kept
         found.append(here)
     return found
-
-
-def _kept(first: RealismLevel, here: RealismLevel) -> tuple[float | None, Interval | None]:
-    """J50 over that of the first level; None where an end of an interval is open or not > 0."""
-    one, two = both_ends(first["j50_mean_ci95"]), both_ends(here["j50_mean_ci95"])
-    if one is None or two is None:
-        return None, None
-    gain, around = relative_gain(first["j50_mean"], one, here["j50_mean"], two)
-    if gain is None or around is None:
-        return None, None
-    return 1.0 + gain, (1.0 + around[0], 1.0 + around[1])

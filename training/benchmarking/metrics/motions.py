@@ -7,17 +7,27 @@ from typing import cast
 import numpy as np
 
 from poise.envs.robots.robot import Robot
-from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
-from poise.training.benchmarking.statistics.differences import relative_gain
+from poise.training.benchmarking.statistics.bootstrap import (
+    DirectionFit,
+    EnvelopeFit,
+    mean_over_directions,
+)
+from poise.training.benchmarking.statistics.eurobench import mean_or_none
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.suites.motions import PART, STANDING
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.jobs import Stage
 from poise.training.benchmarking.trials.trial import Outcome
-from poise.training.motion.following.repertoire import Repertoire, load_repertoire, stage_of
+from poise.training.motion.following.follow import LONGEST
+from poise.training.motion.following.repertoire import (
+    Repertoire,
+    is_clip,
+    kept,
+    load_repertoire,
+)
 from poise.training.running.summary import InMotion, Interval, MotionLevel, MotionMeans
 
-from .played import Played, part, pushes, won
+from .played import Played, part, pushes, ratio, won
 
 MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level has the mean of
 
@@ -34,7 +44,9 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
     chosen = suite.motions
     if chosen is None:
         return Stage(robot, suite.duration, suite.noise)
-    return stage_of(robot, suite.noise, chosen.names, chosen.labels, folder, chosen.tempo)
+    files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
+             for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
+    return Stage(robot, LONGEST, suite.noise, ((STANDING, STANDING), *files), chosen.tempo)
 
 
 def motion_levels(played: Played) -> list[MotionLevel]:
@@ -53,6 +65,7 @@ def motion_levels(played: Played) -> list[MotionLevel]:
 def _level(share: float, name: str | None, outcomes: Sequence[Outcome]) -> MotionLevel:
     trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
     stood = [each for each in outcomes if not each.fallen and each.error is None]
+    means = {key: mean_or_none([getattr(each, key) for each in stood]) for key in MEANS}
     return {
         "motion": name,
         "share": share,
@@ -61,16 +74,9 @@ def _level(share: float, name: str | None, outcomes: Sequence[Outcome]) -> Motio
         "fallen_rate": fallen / trials,
         "fallen_ci95": wilson_interval(fallen, trials),
         "solver_failures": sum(outcome.solver_failures for outcome in outcomes),
-        "steps_mean": _mean(stood, "steps"),
-        **cast(MotionMeans, {key: _mean(stood, key) for key in MEANS}),
+        "steps_mean": mean_or_none([each.steps for each in stood]),
+        **cast(MotionMeans, means),
     }
-
-
-def _mean(outcomes: Sequence[Outcome], name: str) -> float | None:
-    """The mean over the trials that have such a value."""
-    values = [getattr(outcome, name) for outcome in outcomes]
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
 
 
 def in_motion(played: Played) -> list[InMotion]:
@@ -88,9 +94,11 @@ def in_motion(played: Played) -> list[InMotion]:
     standing = _standing(played, moving)
     found: list[InMotion] = []
     if standing is not None:
-        found.append(_row(STANDING, standing, 0, None))
-    found += [_row(name, fit, k, standing) for k, name in enumerate(names)]
-    return [*found, *([_mean_row(fit, won(moving), standing)] if len(names) > 1 else [])]
+        found.append(_row(STANDING, standing.fits[0], None))
+    found += [_row(name, one, standing) for name, one in zip(names, fit.fits, strict=True)]
+    if len(names) > 1:
+        found.append(_mean_row(fit, won(moving), standing))
+    return found
 
 
 def _standing(played: Played, moving: Played) -> EnvelopeFit | None:
@@ -104,9 +112,8 @@ def _standing(played: Played, moving: Played) -> EnvelopeFit | None:
     return mean_over_directions(np.zeros(len(over)), over, won(stood))
 
 
-def _row(name: str | None, fit: EnvelopeFit, k: int, standing: EnvelopeFit | None) -> InMotion:
-    one = fit.fits[k]
-    ratio, ends = _over(standing, one.fit.j50, one.j50_ci)
+def _row(name: str | None, one: DirectionFit, standing: EnvelopeFit | None) -> InMotion:
+    over, ends = _over(standing, one.fit.j50, one.j50_ci)
     return {
         "motion": name,
         "trials": one.fit.trials,
@@ -114,13 +121,13 @@ def _row(name: str | None, fit: EnvelopeFit, k: int, standing: EnvelopeFit | Non
         "share50": one.fit.j50,
         "share50_ci95": one.j50_ci,
         "share50_bound": one.fit.bound,
-        "over_standing": ratio,
+        "over_standing": over,
         "over_standing_ci95": ends,
     }
 
 
 def _mean_row(fit: EnvelopeFit, recovered: np.ndarray, standing: EnvelopeFit | None) -> InMotion:
-    ratio, ends = _over(standing, fit.j50_mean, fit.j50_mean_ci)
+    over, ends = _over(standing, fit.j50_mean, fit.j50_mean_ci)
     return {
         "motion": None,
         "trials": len(recovered),
@@ -128,7 +135,7 @@ def _mean_row(fit: EnvelopeFit, recovered: np.ndarray, standing: EnvelopeFit | N
         "share50": fit.j50_mean,
         "share50_ci95": fit.j50_mean_ci,
         "share50_bound": next((f.fit.bound for f in fit.fits if f.fit.bound), None),
-        "over_standing": ratio,
+        "over_standing": over,
         "over_standing_ci95": ends,
     }
 
@@ -136,11 +143,7 @@ def _mean_row(fit: EnvelopeFit, recovered: np.ndarray, standing: EnvelopeFit | N
 def _over(
     standing: EnvelopeFit | None, share: float, ends: Interval
 ) -> tuple[float | None, Interval | None]:
-    """A share over that of standing, with its interval."""
-    if standing is None or None in ends:
+    """A share over that of standing, with its interval; None where there is none."""
+    if standing is None:
         return None, None
-    known = cast(tuple[float, float], ends)
-    gain, gains = relative_gain(standing.j50_mean, standing.j50_mean_ci, share, known)
-    if gain is None or gains is None:
-        return None, None
-    return 1.0 + gain, (1.0 + gains[0], 1.0 + gains[1])
+    return ratio(standing.j50_mean, standing.j50_mean_ci, share, ends)

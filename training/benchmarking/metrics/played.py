@@ -1,15 +1,16 @@
 """Trials of one controller with their outcomes, as arrays and in parts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
+from poise.training.benchmarking.statistics.differences import relative_gain
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.running.summary import Rate
+from poise.training.running.summary import Counts, Interval, Rate, both_ends
 
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
 RATED = ("mix", "motions")  # parts that the counts are of, where a suite has one
@@ -67,6 +68,48 @@ def rate(recovered: Sequence[bool]) -> Rate:
     }
 
 
+def counts(outcomes: Sequence[Outcome]) -> Counts:
+    """Counts of how trials ended, and medians of what was recorded."""
+    standing = [outcome for outcome in outcomes if outcome.recovered]
+    unpushed = [outcome for outcome in outcomes if outcome.com_drift is not None]
+    trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
+    stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
+
+    def over(
+        name: str, function: Callable[[list[float]], float], chosen: Sequence[Outcome] = outcomes
+    ) -> float | None:
+        values = [getattr(outcome, name) for outcome in chosen]
+        values = [value for value in values if value is not None]
+        return float(function(values)) if values else None
+
+    return {
+        **rate([outcome.recovered for outcome in outcomes]),
+        "fallen": fallen,
+        "never_fell_rate": stood / trials,
+        "never_fell_ci95": wilson_interval(stood, trials),
+        "recovered_with_step": sum(outcome.foot_displaced for outcome in standing),
+        "recovered_in_place": sum(o.steps == 0 and not o.foot_displaced for o in standing),
+        "steps_mean": over("steps", np.mean),
+        "steps_max": over("steps", np.max),
+        "solver_failures": sum(outcome.solver_failures for outcome in outcomes),
+        "solver_failures_recovered": sum(outcome.solver_failures for outcome in standing),
+        "recovery_time_median": over("recovery_time", np.median),
+        "max_com_median": over("max_com", np.median, standing),
+        "max_capture_median": over("max_capture", np.median, standing),
+        "min_cop_margin_median": over("min_cop_margin", np.median, standing),
+        "max_slide": over("max_slide", np.max, standing),
+        "energy_median": over("energy", np.median, standing),
+        "mean_power_median": over("mean_power", np.median, standing),
+        "torque_variation_median": over("torque_variation", np.median, standing),
+        "peak_torque_median": over("peak_torque", np.median),
+        "mean_abs_action": over("mean_abs_action", np.mean),
+        "mean_abs_action_max": over("mean_abs_action", np.max),
+        "com_drift_max": over("com_drift", np.max),
+        "foot_drift_max": over("foot_drift", np.max),
+        "unpushed_lean_max": over("final_lean", np.max, unpushed),
+    }
+
+
 def ankle_limits(played: Played, limits: PushLimits) -> np.ndarray:
     """The ankle limit [N·s] for the push of every trial."""
     direction, _, duration = pushes(played)
@@ -77,3 +120,16 @@ def lost(played: Played) -> list[int]:
     """The numbers of the trials of the suite's own level that were not recovered, rising: those
     whose causes are counted."""
     return [trial.number for trial, outcome in once(played) if not outcome.recovered]
+
+
+def ratio(
+    a: float, a_ci: Interval | None, b: float, b_ci: Interval | None
+) -> tuple[float | None, Interval | None]:
+    """b/a with its interval; None where an end of an interval is open or not > 0."""
+    one, two = both_ends(a_ci), both_ends(b_ci)
+    if one is None or two is None:
+        return None, None
+    gain, around = relative_gain(a, one, b, two)
+    if gain is None or around is None:
+        return None, None
+    return 1.0 + gain, (1.0 + around[0], 1.0 + around[1])

@@ -10,7 +10,7 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, is_folder
 from poise.configs.schema import to_yaml
-from poise.training.benchmarking.statistics.seeds import SeedFigures, seed_figures
+from poise.training.benchmarking.statistics.rates import SeedFigures, seed_figures
 from poise.training.learning.seeds.records import SEEDS
 from poise.training.running.columns import NONE, OVER_SEEDS
 from poise.training.running.summary import Entry, SeedGroup

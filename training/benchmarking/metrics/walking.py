@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
+from poise.training.benchmarking.statistics.eurobench import mean_or_none
 from poise.training.benchmarking.statistics.rates import poisson_interval, wilson_interval
 from poise.training.benchmarking.suites.walking import WALKING
 from poise.training.benchmarking.trials.trial import Outcome
@@ -40,7 +41,7 @@ def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -
     times = [duration if each.fall_time is None else each.fall_time for each in played]
     minutes = sum(times) / 60.0
     low, high = poisson_interval(fallen)
-    means = {key: _mean(outcomes, key) for key in MEANS}
+    means = {key: mean_or_none([getattr(each, key) for each in outcomes]) for key in MEANS}
     told: StepsAsTold = {}
     if name == "gait":
         kept = [not each.fallen and each.error is None and (each.step_error or 0.0) <= AS_TOLD
@@ -59,13 +60,6 @@ def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -
         **told,
         **cast(WalkMeans, means),
     }
-
-
-def _mean(outcomes: Sequence[Outcome], name: str) -> float | None:
-    """The mean over the trials that have such a value."""
-    values = [getattr(outcome, name) for outcome in outcomes]
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
 
 
 def phase_figures(played: Played, envelope: EnvelopeFigures) -> list[PhaseJ50]:

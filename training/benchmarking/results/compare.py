@@ -112,10 +112,7 @@ def print_comparison(found: Comparison, a: str | Path, b: str | Path, console: C
     console.print(table)
 
 
-Key = tuple[str, ...]
-
-
-def _outcomes(results: Results, name: str) -> dict[Key, bool]:
+def _outcomes(results: Results, name: str) -> dict[tuple[str, ...], bool]:
     """A mapping from what a trial must share to be a pair, to whether the controller recovered."""
     return {record.met: record.recovered for record in results.of(name)}
 

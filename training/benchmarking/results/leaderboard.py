@@ -51,12 +51,7 @@ of the same pushes.
 HUMANOID: Final = "humanoid"  # whose page names no robot
 COLUMNS = {"recovered of the mix", *IN_PAIRS, *(each.heading for each in (
     J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, ROOT, TICK))}  # fmt: skip
-SAME: Final = (
-    "suite",
-    "seed",
-    "robot",
-    "reference",
-)  # of results whose rows may stand in one table
+SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
 
 
 def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = None) -> Path:

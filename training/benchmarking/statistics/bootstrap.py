@@ -91,18 +91,22 @@ def mean_over_directions(
     impulse, recovered = check_trials(impulse, recovered)
     directions, rows = _strata(direction, impulse.size)
     seeds = np.random.SeedSequence(seed).spawn(len(rows))
-    parts = [
-        _direction_fit(impulse[i], recovered[i], _resample(i.size, resamples, s), confidence)
-        for i, s in zip(rows, seeds, strict=True)
-    ]
-    fits = tuple(part[0] for part in parts)
-    replicates = np.mean([part[1] for part in parts], axis=0)
+    fits, replicates = [], []
+    for i, s in zip(rows, seeds, strict=True):
+        weights, freedom = _resample(i.size, resamples, s), (i.size, PARAMETERS)
+        fit = fit_logistic(impulse[i], recovered[i])
+        drawn = solve_weighted(impulse[i], recovered[i], weights)[:2]
+        intervals = (percentile_interval(each, confidence, freedom=freedom) for each in drawn)
+        fits.append(DirectionFit(fit, *intervals))
+        replicates.append(drawn[0])
     return EnvelopeFit(
         directions=directions,
-        fits=fits,
+        fits=tuple(fits),
         j50_mean=float(np.mean([f.fit.j50 for f in fits])),
         j50_mean_ci=percentile_interval(
-            replicates, confidence, freedom=(impulse.size, PARAMETERS * len(rows))
+            np.mean(replicates, axis=0),
+            confidence,
+            freedom=(impulse.size, PARAMETERS * len(rows)),
         ),
         bounded=sum(f.fit.bound is not None for f in fits),
     )
@@ -158,20 +162,6 @@ def j50_gain(
         sum(gain.bounded for gain in gains),
     )
     return EnvelopeGain(mean, directions, tuple(gains))
-
-
-def _direction_fit(
-    impulse: np.ndarray, recovered: np.ndarray, weights: np.ndarray, confidence: float
-) -> tuple[DirectionFit, np.ndarray]:
-    """Fit and its J50 replicates, (resamples,)."""
-    j50, j90, _, _ = solve_weighted(impulse, recovered, weights)
-    freedom = (impulse.size, PARAMETERS)
-    fit = DirectionFit(
-        fit_logistic(impulse, recovered),
-        percentile_interval(j50, confidence, freedom=freedom),
-        percentile_interval(j90, confidence, freedom=freedom),
-    )
-    return fit, j50
 
 
 def _gain(

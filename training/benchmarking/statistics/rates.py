@@ -4,8 +4,9 @@ Every function takes NumPy arrays (or what `np.asarray` takes), keeps no state, 
 random numbers draws them from a seed, so that the same trials give the same figures.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 import scipy  # loads its parts when they are first asked for
@@ -37,6 +38,17 @@ class SeedAggregate:
     interval: Interval
     seeds: int
     tasks: int
+
+
+class SeedFigures(TypedDict):
+    """A figure over training seeds, `tasks` of each; `worst` is that of `worst_seed`."""
+
+    iqm: float
+    iqm_ci95: tuple[float | None, float | None]
+    tasks: int
+    values: list[float]
+    worst: float
+    worst_seed: int
 
 
 def poisson_interval(count: int, confidence: float = 0.95) -> Interval:
@@ -136,6 +148,20 @@ def seed_aggregate(
     drawn = np.take_along_axis(table[None], rows, axis=1)
     replicates = scipy.stats.trim_mean(drawn.reshape(resamples, -1), 0.25, axis=1)
     return SeedAggregate(iqm(table), percentile_interval(replicates, confidence), seeds, tasks)
+
+
+def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
+    """IQM of (seeds, tasks) with its interval, every seed's mean, and the worst of these."""
+    found, values = seed_aggregate(scores), scores.mean(axis=1)
+    worst = int(np.argmin(values))
+    return {
+        "iqm": found.iqm,
+        "iqm_ci95": found.interval,
+        "tasks": found.tasks,
+        "values": values.tolist(),
+        "worst": float(values[worst]),
+        "worst_seed": seeds[worst],
+    }
 
 
 def percentile_interval(

@@ -1,11 +1,11 @@
 """The part of suites in which motions are performed, pushed by shares of the controller's J50."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import Literal, NamedTuple, Self
+from typing import Literal
 
 from poise.baselines.balance.references.tempo import Tempo
 from poise.envs.physics.pushes.sampler import LimitTable
@@ -24,16 +24,6 @@ def label(name: str) -> str:
     """What a motion is called in trials: its name, or that of its file."""
     of_file = Path(name).suffix.lower() in (".npz", ".bvh", ".yaml", ".yml")
     return Path(name).stem if of_file else name
-
-
-class Cell(NamedTuple):
-    """A motion, pushed by a share of J50 towards an angle [deg]; what else is drawn goes by
-    `drawn`, which depends on motion, direction and repeat alone."""
-
-    motion: str
-    share: float
-    angle: float
-    drawn: int
 
 
 @dataclass(frozen=True)
@@ -73,10 +63,6 @@ class Motions(Part):
         """What the motions are called in trials."""
         return tuple(label(name) for name in self.names)
 
-    def performing(self, names: Sequence[str]) -> Self:
-        """The part with other motions."""
-        return replace(self, names=tuple(names))
-
     def first(self, draw: Draw, number: int) -> list[Trial]:
         if self.of == "limits":
             return self._cells(draw, number, draw.limits.j50())
@@ -112,23 +98,17 @@ class Motions(Part):
         return LimitTable(tuple(self._standing.angles), tuple(rough))
 
     def _cells(self, draw: Draw, number: int, j50: LimitTable, stage: int = 1) -> list[Trial]:
-        """All trials of the motions."""
-        return [
-            self._trial(draw, number + i, cell, j50, stage) for i, cell in enumerate(self._all())
-        ]
-
-    def _all(self) -> Iterator[Cell]:
-        for share, motion in product(self.shares, range(len(self.labels))):
+        """All trials of the motions; what is drawn goes by motion, direction and repeat alone."""
+        trials: list[Trial] = []
+        for share, (motion, name) in product(self.shares, enumerate(self.labels)):
             for k in range(self.directions * self.trials):
                 angle = 360.0 * (k % self.directions) / self.directions
                 drawn = MOST_TRIALS + len(self.labels) * k + motion  # no other trial's number
-                yield Cell(self.labels[motion], share, angle, drawn)
-
-    def _trial(self, draw: Draw, number: int, cell: Cell, j50: LimitTable, stage: int) -> Trial:
-        moment = generator(draw.seed, cell.drawn).uniform(MARGIN, 1.0 - MARGIN)
-        start = float(moment) * draw.motions[cell.motion]
-        push = replace(draw.push(cell.angle, cell.share * j50(cell.angle)), start=start)
-        pushes = [push] if cell.share else []
-        trial = draw.trial(number, pushes, part=PART, stage=stage, motion=cell.motion,
-                           share=cell.share)  # fmt: skip
-        return replace(trial, seed=start_seed(draw.seed, cell.drawn))
+                moment = generator(draw.seed, drawn).uniform(MARGIN, 1.0 - MARGIN)
+                start = float(moment) * draw.motions[name]
+                push = replace(draw.push(angle, share * j50(angle)), start=start)
+                pushes = [push] if share else []
+                trial = draw.trial(number + len(trials), pushes, part=PART, stage=stage,
+                                   motion=name, share=share)  # fmt: skip
+                trials.append(replace(trial, seed=start_seed(draw.seed, drawn)))
+        return trials

@@ -6,9 +6,10 @@ were.
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import PushSampler, Range
-from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Trial
 
 from .draw import MOST_TRIALS, Draw, Part, check_rising, generator, start_seed
@@ -35,13 +36,9 @@ class Random(Part):
         check_forces(self.pushes)
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        limits = draw.limits
-        sampler = measured(replace(self.pushes, bodies=self.pushes.bodies or draw.bodies), limits)
         trials = []
         for here in range(number, number + self.trials):
-            rng = generator(draw.seed, here)
-            drawn = sampler.sample(rng, limits.robot, limits.margin, limits.table)
-            pushes = [push for push in drawn if isinstance(push, Push)]
+            pushes = sampled(self.pushes, draw.bodies, draw, generator(draw.seed, here))
             trials.append(draw.trial(here, pushes, part="random"))
         return trials
 
@@ -73,15 +70,9 @@ class Sequence(Part):
         check_rising(self.later, "later")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        limits = draw.limits
-        bodies = self.pushes.bodies or draw.bodies[:1]
-        sampler, trials = measured(replace(self.pushes, bodies=bodies), limits), []
+        trials = []
         for here in range(number, number + self.trials):
-            rng = generator(draw.seed, here)
-            drawn = sampler.sample(rng, limits.robot, limits.margin, limits.table)
-            first, *rest = [push for push in drawn if isinstance(push, Push)]
-            scaled = [replace(p, impulse=p.impulse * rng.uniform(*self.later)) for p in rest]
-            pushes = (first, *(push for push in scaled if push.start < self.until))
+            pushes = one_after_the_other(self.pushes, self.later, self.until, draw, here)
             trials.append(Trial(here, start_seed(draw.seed, here), pushes, part="sequence"))
         return trials
 
@@ -96,11 +87,30 @@ class Quiet(Part):
         return [draw.trial(k, (), part="quiet") for k in range(number, number + self.trials)]
 
 
-def measured(sampler: PushSampler, limits: PushLimits) -> PushSampler:
-    """Return the sampler, by the ankle limit where no J50 of the robot was measured."""
+def sampled(
+    sampler: PushSampler, bodies: tuple[str, ...], draw: Draw, rng: np.random.Generator
+) -> list[Push]:
+    """The pushes of a trial, of `bodies` where the sampler names none.
+
+    What is a fraction of J50 is one of the ankle limit where no J50 of the robot was measured.
+    """
+    limits = draw.limits
+    sampler = replace(sampler, bodies=sampler.bodies or bodies)
     if sampler.unit == "controller_fraction" and limits.table is None:
-        return replace(sampler, unit="ankle_fraction")
-    return sampler
+        sampler = replace(sampler, unit="ankle_fraction")
+    drawn = sampler.sample(rng, limits.robot, limits.margin, limits.table)
+    return [push for push in drawn if isinstance(push, Push)]
+
+
+def one_after_the_other(
+    sampler: PushSampler, later: Range, until: float, draw: Draw, number: int
+) -> tuple[Push, ...]:
+    """The pushes of a trial that begin before `until` [s]; all but the first times a number from
+    `later`. Without `bodies` the robot's first push body is pushed."""
+    rng = generator(draw.seed, number)
+    first, *rest = sampled(sampler, draw.bodies[:1], draw, rng)
+    scaled = [replace(p, impulse=p.impulse * rng.uniform(*later)) for p in rest]
+    return (first, *(push for push in scaled if push.start < until))
 
 
 def check_forces(pushes: PushSampler) -> None:

@@ -11,8 +11,8 @@ from poise.envs.physics.pushes.sampler import PushSampler, Range
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.trial import Conditions, Trial
 
-from .draw import MOST_TRIALS, Draw, Part, generator, start_seed
-from .random import check_forces, check_rising, measured
+from .draw import MOST_TRIALS, Draw, Part, check_rising, start_seed
+from .random import check_forces, one_after_the_other
 from .walking import from_start
 
 PART = "scenarios"
@@ -35,17 +35,11 @@ class Scenario:
             check_forces(self.pushes)
         check_rising(self.later, "later")
 
-    def drawn(self, draw: Draw, number: int) -> list[Push]:
+    def drawn(self, draw: Draw, number: int) -> tuple[Push, ...]:
         """The pushes of a trial, by a number that all scenarios share."""
         if self.pushes is None:
-            return []
-        limits, rng = draw.limits, generator(draw.seed, number)
-        bodies = self.pushes.bodies or draw.bodies[:1]
-        sampler = measured(replace(self.pushes, bodies=bodies), limits)
-        found = sampler.sample(rng, limits.robot, limits.margin, limits.table)
-        first, *rest = [push for push in found if isinstance(push, Push)]
-        scaled = [replace(p, impulse=p.impulse * rng.uniform(*self.later)) for p in rest]
-        return [first, *(push for push in scaled if push.start < self.duration - CALM)]
+            return ()
+        return one_after_the_other(self.pushes, self.later, self.duration - CALM, draw, number)
 
 
 @dataclass(frozen=True)
@@ -79,7 +73,7 @@ class Scenarios(Part):
                 trials.append(
                     Trial(
                         number + len(trials), start_seed(draw.seed, number + k),
-                        tuple(scenario.drawn(draw, number + k)), Conditions(realism=level),
+                        scenario.drawn(draw, number + k), Conditions(realism=level),
                         part=PART, level=name, commands=commands, until=scenario.duration,
                     )
                 )  # fmt: skip

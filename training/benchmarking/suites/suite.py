@@ -85,7 +85,7 @@ class Suite(Standard):
         """The suite with other motions; raises ConfigError where none is performed."""
         if self.motions is None:
             raise ConfigError("this suite performs no motions", field="motions")
-        return replace(self, motions=self.motions.performing(names))
+        return replace(self, motions=replace(self.motions, names=tuple(names)))
 
     def resized(self, trials: int) -> Suite:
         """The suite with another number of trials in its only part; of several parts, with at most

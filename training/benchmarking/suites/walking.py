@@ -7,7 +7,6 @@ whatever their size and direction.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -140,7 +139,6 @@ class WalkKick(Walking, Part):
 
     speeds: tuple[float, ...] = field(default=(0.5, 1.0), metadata={"above": 0.0})  # [m/s]
     trials: int = field(default=400, metadata={"min": 1, "max": MOST_TRIALS})  # of each
-    SIZE: ClassVar[str] = "trials"
 
     def __post_init__(self) -> None:
         if not self.speeds:

@@ -127,13 +127,11 @@ def does_not_walk(name: str, source: str) -> ConfigError:
                        field="controller", choices=walking_controllers())  # fmt: skip
 
 
-def check_follows(name: str, agent: Agent, source: str) -> None:
-    """Raise ConfigError unless an agent tracks a reference; `source` is what asks for it."""
-    if not isinstance(agent.env, ResidualBalanceEnv):
-        raise ConfigError(
-            f"{shown(name)} follows no motion: name a controller that tracks a reference, or a "
-            "policy on one", source=source, field="controller",
-        )  # fmt: skip
+def follows_no_motion(name: str, source: str | None = None) -> ConfigError:
+    """The error of a controller that tracks no reference where `source` has a motion performed."""
+    return ConfigError(f"{shown(name)} follows no motion: name a controller that tracks a "
+                       "reference, or a policy on one", source=source,
+                       field="controller")  # fmt: skip
 
 
 def _stand_in(config: ControllerConfig) -> str:

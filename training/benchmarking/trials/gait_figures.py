@@ -1,8 +1,8 @@
 """The figures of a walk: its speed against the command, its steps, what it costs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,17 +20,11 @@ SLOW = 0.1  # [m/s] below which a cost of transport says nothing
 WINDOW = 4  # steps, two strides, by which the end of a walk is judged
 
 
-@dataclass(frozen=True)
-class Touchdowns:
-    """The touchdowns of a walk, in the order of time.
+class Touchdowns(NamedTuple):
+    """The touchdowns of a walk, in the order of time."""
 
-    Attributes:
-        row: (k,) of the record.
-        foot: (k,) which one landed.
-    """
-
-    row: np.ndarray
-    foot: np.ndarray
+    row: np.ndarray  # (k,) of the record
+    foot: np.ndarray  # (k,) which one landed
 
 
 def touchdowns(record: WalkArrays) -> Touchdowns:

@@ -1,8 +1,7 @@
 """The record of a walk, from which its figures are computed when the trial is over."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,42 +11,27 @@ from poise.envs.balance.episode import ENERGY, POSITIVE_WORK
 from poise.envs.physics.legs import find_legs
 
 
-class Row(NamedTuple):
-    """A robot that walks, at the end of a policy step."""
-
-    time: float  # [s]
-    com: np.ndarray  # (2,) [m]
-    yaw: float  # of the heading [rad]
-    down: np.ndarray  # (2,) whether a foot touches the ground
-    feet: np.ndarray  # (2, 2) soles along the ground [m]
-    heights: np.ndarray  # (2,) of the soles [m]
-    spin: float  # angular momentum about the vertical through the CoM [N·m·s]
-    knees: np.ndarray  # (2,) |τ|/m of each leg's knee [N·m/kg]; NaN where none is known
-    energy: float  # ∫ Σ |τ q̇| dt [J]
-    work: float  # ∫ Σ max(τ q̇, 0) dt [J]
-
-
 @dataclass(frozen=True)
 class WalkArrays:
-    """The rows of a walk as arrays, first axis time; see `Row`. `yaw` is continuous."""
+    """A robot that walks, at the end of each of n policy steps."""
 
-    time: np.ndarray
-    com: np.ndarray
-    yaw: np.ndarray
-    down: np.ndarray
-    feet: np.ndarray
-    heights: np.ndarray
-    spin: np.ndarray
-    knees: np.ndarray
-    energy: np.ndarray
-    work: np.ndarray
+    time: np.ndarray  # (n,) [s]
+    com: np.ndarray  # (n, 2) [m]
+    yaw: np.ndarray  # (n,) of the heading, continuous [rad]
+    down: np.ndarray  # (n, 2) whether a foot touches the ground
+    feet: np.ndarray  # (n, 2, 2) soles along the ground [m]
+    heights: np.ndarray  # (n, 2) of the soles [m]
+    spin: np.ndarray  # (n,) angular momentum about the vertical through the CoM [N·m·s]
+    knees: np.ndarray  # (n, 2) |τ|/m of each leg's knee [N·m/kg]; NaN where none is known
+    energy: np.ndarray  # (n,) ∫ Σ |τ q̇| dt [J]
+    work: np.ndarray  # (n,) ∫ Σ max(τ q̇, 0) dt [J]
 
 
 class WalkRecord:
     """Keeps what a walk's figures need; hand it to `run_trial`."""
 
     def __init__(self) -> None:
-        self._rows: list[Row] = []
+        self._rows: list[tuple[object, ...]] = []  # one for each field of `WalkArrays`
         self._knees: list[int | None] = []  # the motor of each leg's knee
 
     def __call__(self, env: BalanceEnv) -> None:
@@ -56,20 +40,17 @@ class WalkRecord:
         state, metrics = env.simulation.state, env.episode.metrics
         torque = np.abs(env.simulation.views.ctrl) / env.robot.mass
         knees = [np.nan if motor is None else torque[motor] for motor in self._knees]
-        self._rows.append(
-            Row(
-                env.simulation.time, state.com[:2].copy(), state.heading_yaw,
-                state.contacts > 0.5, state.sole_points[:, :2].copy(),
-                state.sole_points[:, 2].copy(), float(state.angular_momentum[2]), np.array(knees),
-                float(metrics[ENERGY]), float(metrics[POSITIVE_WORK]),
-            )
-        )  # fmt: skip
+        self._rows.append((
+            env.simulation.time, state.com[:2].copy(), state.heading_yaw,
+            state.contacts > 0.5, state.sole_points[:, :2].copy(),
+            state.sole_points[:, 2].copy(), float(state.angular_momentum[2]), np.array(knees),
+            float(metrics[ENERGY]), float(metrics[POSITIVE_WORK]),
+        ))  # fmt: skip
 
     def arrays(self) -> WalkArrays:
         """What was kept."""
-        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
-        arrays = dict(zip(Row._fields, columns, strict=True))
-        return WalkArrays(**{**arrays, "yaw": np.unwrap(arrays["yaw"])})
+        arrays = WalkArrays(*map(np.array, zip(*self._rows, strict=True)))
+        return replace(arrays, yaw=np.unwrap(arrays.yaw))
 
 
 def knee_motors(env: BalanceEnv) -> list[int | None]:

@@ -1,7 +1,7 @@
 """Jobs tell a process what to play, and `play` plays it."""
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +47,11 @@ class Stage:
             given["tempo"] = self.tempo
         return load_agent(controller, robot, **given)
 
-    def motion(self, trial: Trial, robot: Robot | None = None) -> ReferenceMotion | None:
-        """The motion that a trial performs, or None. Raises ConfigError."""
-        if trial.motion is None:
+    def motion(self, name: str | None, robot: Robot | None = None) -> ReferenceMotion | None:
+        """The motion of this name, which a trial performs, or None. Raises ConfigError."""
+        if name is None:
             return None
-        return load_motion(dict(self.motions)[trial.motion], robot or _robot(self.robot))
+        return load_motion(dict(self.motions)[name], robot or _robot(self.robot))
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def play(job: Job) -> Outcome:
     Raises PoiseError when the controller cannot be loaded here: that is no trial.
     """
     variants = _loaded(job.stage, job.controller)
-    motion = _motion(job.stage, job.trial)
+    motion = _motion(job.stage, job.trial.motion)
     try:
         agent = variants.under(job.trial.conditions, job.trial.terrain, motion)
         return run_trial(agent, job.trial)
@@ -80,14 +80,9 @@ def play(job: Job) -> Outcome:
         return failed(error)
 
 
-def _motion(stage: Stage, trial: Trial) -> ReferenceMotion | None:
-    key = (stage, trial.motion)
-    if key not in _motions:
-        _motions[key] = stage.motion(trial)
-    return _motions[key]
-
-
-_motions: dict[tuple[Stage, str | None], ReferenceMotion | None] = {}  # of this process
+@cache
+def _motion(stage: Stage, name: str | None) -> ReferenceMotion | None:
+    return stage.motion(name)
 
 
 @lru_cache(maxsize=1)

@@ -89,13 +89,15 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
         outcome = replace(outcome, sway=body, sway_recovery=recovery)
     if outcome.recovered:
         return outcome
-    return replace(outcome, **asdict(diagnose(env, course.course(), first_start(trial), loss)))
+    return replace(
+        outcome, **asdict(diagnose(env, course.course(), first_start(trial) or 0.0, loss))
+    )
 
 
-def first_start(trial: Trial) -> float:
-    """When the first push or kick begins [s]; 0 without one."""
+def first_start(trial: Trial) -> float | None:
+    """When the first push or kick begins [s]; None without one."""
     events: list[Push | Kick] = [*trial.pushes, *trial.kicks]
-    return min((each.start for each in events), default=0.0)
+    return min((each.start for each in events), default=None)
 
 
 def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
@@ -117,8 +119,7 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     ):
         cost = figures.pop(per_metre)
         figures[name] = None if cost is None else cost / weight
-    starts = [*(push.start for push in trial.pushes), *(kick.start for kick in trial.kicks)]
-    first = min(starts, default=None)
+    first = first_start(trial)
     left = int(np.argmax(foot_signs(env.robot)))
     phase = None if first is None else walk.phase_at(first, left)
     outcome = replace(

@@ -20,11 +20,10 @@ PUSH_COLUMNS = (
     *("body", "start", "duration", "impulse", "direction", "elevation"),
     *("point_x", "point_y", "point_z", "profile"),
 )
-CONDITION_COLUMNS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
-    *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later", "commands", "kicks", "terrain"),
-    *("motion", "share", "until"),
+    *(*PUSH_COLUMNS, *Conditions.__dataclass_fields__, "limit_fraction", "later", "commands"),
+    *("kicks", "terrain", "motion", "share", "until"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__

@@ -13,7 +13,7 @@ from poise.configs.reading import is_file, read_json
 from poise.training.running.provenance import Circumstances
 
 if TYPE_CHECKING:  # they load SciPy and environments
-    from poise.training.benchmarking.statistics.seeds import SeedFigures
+    from poise.training.benchmarking.statistics.rates import SeedFigures
     from poise.training.learning.config import TrainConfig
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`

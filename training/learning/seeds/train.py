@@ -16,7 +16,7 @@ from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_folder
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
-from poise.training.benchmarking.statistics.seeds import seed_figures
+from poise.training.benchmarking.statistics.rates import seed_figures
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.curriculum import curriculum_levels
 from poise.training.learning.policy_files import CONFIG, STATE, find_checkpoint, read_state

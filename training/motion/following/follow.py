@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import AHEAD, START, TURN, ReferenceMotion
 from poise.baselines.balance.references.tempo import Tempo
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_number
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import FallLimits
@@ -19,7 +19,7 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
-from poise.training.benchmarking.trials.agents import Agent, load_agent
+from poise.training.benchmarking.trials.agents import Agent, follows_no_motion, load_agent
 from poise.training.benchmarking.trials.play import Watch, run_trial
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
@@ -182,10 +182,7 @@ def performer(
     try:
         return load_agent(controller, robot, **given)
     except TypeError:
-        raise ConfigError(
-            f"{shown(controller)} follows no motion: name a controller that tracks a reference, "
-            "or a policy on one", field="controller",
-        ) from None  # fmt: skip
+        raise follows_no_motion(controller) from None
 
 
 def fall_limits(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:

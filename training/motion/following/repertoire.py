@@ -12,17 +12,12 @@ from poise.baselines.balance.references.robot_clip import (
     reference_from,
     write_robot_clip,
 )
-from poise.baselines.balance.references.tempo import Tempo
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh, known_clips
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.files import resolve
 from poise.configs.reading import is_file
-from poise.envs.balance.config import StartNoise
 from poise.envs.robots.robot import Robot
-from poise.training.benchmarking.trials.jobs import Stage
-
-from .follow import LONGEST
 
 FOLDER = "motions"  # in that of the results
 STANDING = "standing"
@@ -52,16 +47,6 @@ class Repertoire:
 def kept(folder: Path, name: str) -> Path:
     """Where the clip of a motion is kept."""
     return folder / FOLDER / f"{name}.npz"
-
-
-def stage_of(
-    robot: str | Path, noise: StartNoise, names: Sequence[str], labels: Sequence[str], folder: Path,
-    tempo: Tempo,
-) -> Stage:  # fmt: skip
-    """The stage of a suite that performs motions, which `folder` keeps."""
-    files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
-             for name, label in zip(names, labels, strict=True)]  # fmt: skip
-    return Stage(robot, LONGEST, noise, ((STANDING, STANDING), *files), tempo)
 
 
 def is_clip(name: str) -> bool:

@@ -66,8 +66,13 @@ def open_synthesis(
                                   source=file, field=f"clips.{told.name}")  # fmt: skip
         return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
                          robot_joins=joins)  # fmt: skip
-    names = [name for name in packaged_clips() if _fits(name, robot)]
-    steps = [] if robot is None else _stepping()
+    names = packaged_clips()
+    steps: list[str] = []
+    if robot is not None:  # clips whose feet stay; of those whose feet move the motion, if any
+        walks, motions = [name for name in names if name.endswith("_walk")], motions_with_steps()
+        moving = ("_walk", *(f"_{motion}" for motion in motions))
+        names = [name for name in names if not name.endswith(moving)]
+        steps = [*walks, *motions]
     said = set() if script is None else clip_names(script)
     names += [name for name in steps if any(name == n or name.endswith(f"_{n}") for n in said)]
     limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
@@ -75,17 +80,6 @@ def open_synthesis(
     return Synthesis(make_graph(loaded, limits, robot=robot or ""),
                      {entry.name: clip for entry, clip in loaded}, kind,
                      robot_joins=joins, others=[n for n in steps if n not in names])  # fmt: skip
-
-
-def _stepping() -> list[str]:
-    """The packaged clips and motions whose feet move: the motion, where there are both."""
-    motions = motions_with_steps()
-    return [*(name for name in packaged_clips() if name.endswith("_walk")), *motions]
-
-
-def _fits(name: str, robot: str | None) -> bool:
-    """Without a robot every packaged clip; with one those whose feet stay."""
-    return robot is None or not name.endswith(("_walk", *(f"_{m}" for m in motions_with_steps())))
 
 
 def load_clips(

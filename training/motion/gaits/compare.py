@@ -14,18 +14,19 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, write_atomic
 from poise.configs.numbers import whole_number
 from poise.configs.outputs import check_out_folder
-from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.benchmarking.evaluation.tick_times import Clocked
+from poise.training.benchmarking.statistics.eurobench import mean_or_none
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import Agent, check_walks, load_agent
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.running.folder_lock import FolderLock
+from poise.training.running.terminal import terminal
 
 from .figures import GaitFigures, stance_plot
-from .human import KneeMoment, load_knee_moment
-from .stance import StanceRecord, Stances
+from .stance import KneeMoment, StanceRecord, Stances, load_knee_moment
 
 SETTLED = 5.0  # [s] after which stances count
 TICKS_FROM = 3.0  # [s] after which ticks are timed, for so long
@@ -92,8 +93,17 @@ def compare_gaits(
                 figures.append(walk_at(agent, speed, starts, seed, band, tick))
                 say(_line(figures[-1]))
         if pushed:
-            figures = _with_j50(figures, names, push_suite, out, robot, seed, workers, allow)
-        write_figures(Path(out), figures, band, body, duration, seed)
+            summary = evaluate(names, push_suite, out=Path(out) / "walk-push", robot=robot,
+                               seed=seed, workers=workers, console=terminal(),
+                               allow=allow)  # fmt: skip
+            j50 = {name: entry.get("j50_mean") for name, entry in summary["controllers"].items()}
+            figures = [replace(each, j50=j50.get(each.controller)) for each in figures]
+        content = {
+            "robot": body.name, "seed": seed, "duration": duration, "human": asdict(band),
+            "gaits": [asdict(each) for each in figures],
+        }  # fmt: skip
+        text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+        write_atomic(Path(out) / "gaits.json", text)
         stance_plot(Path(out) / "stance_knee.png", figures, band)
     return figures
 
@@ -139,7 +149,7 @@ def figures_of(
 ) -> GaitFigures:
     """The figures of walks: falls of all of them, the rest of those that did not fall."""
     stood = [outcome for outcome in outcomes if not outcome.fallen]
-    means = {key: _mean([getattr(each, key) for each in stood]) for key in MEANS}
+    means = {key: mean_or_none([getattr(each, key) for each in stood]) for key in MEANS}
     curves = np.concatenate([each.knees for each in stances]) if stances else np.zeros((0, 1))
     curve = curves.mean(axis=0) if len(curves) else np.zeros(0)
     off = curve - band.curves()[0] if len(curves) else None
@@ -150,7 +160,7 @@ def figures_of(
         knee_stance=float(np.abs(curves).mean()) if len(curves) else None,
         knee_rmse=None if off is None else float(np.sqrt(np.mean(off**2))),
         force_peak=float(peaks.mean()) if len(peaks) else None,
-        height_amplitude=_mean([each.height_amplitude for each in stances]),
+        height_amplitude=mean_or_none([each.height_amplitude for each in stances]),
         knee_curve=tuple(float(value) for value in curve), tick=tick,
     )  # fmt: skip
 
@@ -160,11 +170,6 @@ MEANS = (
     "speed_ahead", "speed_error_rms", "cost_of_transport", "positive_cost_of_transport",
     "knee_mean", "knee_peak", "step_length", "step_time",
 )  # fmt: skip
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
 
 
 def tick_time(agent: Agent, seed: int) -> float | None:
@@ -185,31 +190,6 @@ def tick_time(agent: Agent, seed: int) -> float | None:
         return 1e6 * float(np.median(clocked.seconds))
     finally:
         env.controller = inner
-
-
-def _with_j50(
-    figures: list[GaitFigures], names: Sequence[str], suite: str | Path, out: str | Path,
-    robot: str, seed: int, workers: int | None, allow: str | Iterable[str],
-) -> list[GaitFigures]:  # fmt: skip
-    """The same with J50 of a suite."""
-    from poise.training.running.terminal import terminal
-
-    summary = evaluate(names, suite, out=Path(out) / "walk-push", robot=robot, seed=seed,
-                       workers=workers, console=terminal(), allow=allow)  # fmt: skip
-    found = {name: entry.get("j50_mean") for name, entry in summary["controllers"].items()}
-    return [replace(each, j50=found.get(each.controller)) for each in figures]
-
-
-def write_figures(
-    out: Path, figures: Sequence[GaitFigures], band: KneeMoment, robot: Robot, duration: float,
-    seed: int,
-) -> None:  # fmt: skip
-    """Write gaits.json: settings, the human band, the figures."""
-    content = {
-        "robot": robot.name, "seed": seed, "duration": duration, "human": asdict(band),
-        "gaits": [asdict(each) for each in figures],
-    }  # fmt: skip
-    write_atomic(out / "gaits.json", json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
 
 def _line(f: GaitFigures) -> str:

@@ -13,7 +13,7 @@ from scipy import stats
 from poise.configs.errors import ConfigError
 from poise.training.benchmarking.metrics import seed_groups as module
 from poise.training.benchmarking.metrics.seed_groups import seed_groups, seed_lines
-from poise.training.benchmarking.statistics.seeds import seed_figures
+from poise.training.benchmarking.statistics.rates import seed_figures
 from poise.training.learning.seeds.records import expand_seeds
 
 

@@ -10,8 +10,7 @@ import yaml
 from poise.configs.errors import ConfigError
 from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.evaluation.evaluate import evaluate
-from poise.training.benchmarking.results.film import film
-from poise.training.benchmarking.results.replay import replay
+from poise.training.benchmarking.results.replay import film, replay
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
 
