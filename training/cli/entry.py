@@ -15,7 +15,7 @@ import poise
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
 from poise.training.running.options.arguments import check_flags
 from poise.training.running.options.pages import print_commands
-from poise.training.running.options.parsing import parsed
+from poise.training.running.options.parsing import answered
 from poise.training.running.options.spelling import respelled, suggestion
 from poise.training.running.stopping import (
     exit_at_once,
@@ -27,6 +27,7 @@ from poise.training.running.stopping import (
 from poise.training.running.terminal import speak_plainly, terminal
 
 from .commands import COMMANDS
+from .policies import run as run_policies
 
 SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
 HELP = ("-h", "--help", "--help-all")
@@ -147,12 +148,8 @@ def _run(args: list[str]) -> int:
 
         return run_motion(given)
     if name == "policies":  # it has one, too
-        from .policies import run as run_policies
-
         return run_policies(given)
-    given = ["--help" if arg == "--help-all" else arg for arg in given]  # all there is
-    code = parsed(COMMANDS[name], given, f"poise {name}")()
-    return code if isinstance(code, int) else 0
+    return answered(COMMANDS[name], given, f"poise {name}")
 
 
 def _complete(shell: str) -> int:

@@ -16,9 +16,8 @@ from types import TracebackType
 from poise.configs.errors import PoiseError
 
 HOLDER = ".poise.lock"  # who holds the lock: of a process that was killed it says nothing
-ARRAY = (
-    "SLURM_ARRAY_TASK_ID"  # of the environment: the number of a run among several of one command
-)
+#: of the environment: the number of a run among several of one command
+ARRAY = "SLURM_ARRAY_TASK_ID"
 #: what file systems of clusters say that do not lock a folder, or nothing at all
 NO_LOCKS = (errno.EBADF, errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
@@ -129,8 +128,6 @@ def _remove_parts(path: Path) -> None:
 def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # of another user
-        return True
+    except (OSError, OverflowError) as error:
+        return not isinstance(error, ProcessLookupError)  # else it is of another user
     return True
