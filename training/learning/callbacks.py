@@ -142,8 +142,7 @@ class Checkpoints(BaseCallback):
         evaluation, batch = self.config.evaluation, self._batch
         assert batch is not None  # made at the start of the training
         normalize = self._normalize()
-        recovered: list[bool] = []
-        fallen: list[bool] = []
+        ends: list[tuple[bool, bool]] = []  # whether recovered, whether fallen
         actions: list[float] = []
         seeds = np.random.SeedSequence(evaluation.seed).generate_state(evaluation.trials)
         size = len(batch.envs)
@@ -166,12 +165,11 @@ class Checkpoints(BaseCallback):
                 running = [i for i in range(counted) if i not in result]
                 actions.extend(np.abs(action[running]).mean(axis=1))
                 batch.step(action, at_end)
-            recovered.extend(result[i][0] for i in range(counted))
-            fallen.extend(result[i][1] for i in range(counted))
-        rate = float(np.mean(recovered))
+            ends.extend(result[i] for i in range(counted))
+        rate, fallen = (float(share) for share in np.mean(ends, axis=0))
         return {
             "recovered": rate,
-            "fallen": float(np.mean(fallen)),
+            "fallen": fallen,
             "mean_abs_action": float(np.mean(actions)),
             "score": rate,
         }

@@ -46,10 +46,10 @@ class FolderLock:
             raise PoiseError(f"{path}: {_holder(path)} is writing there{_of_array()}") from None
         except OSError as error:
             raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
+        command = shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
+        text = f"{os.getpid()}\n{command}\n{socket.gethostname()}\n"
         with contextlib.suppress(OSError):  # a full disk: the run says so where it matters
-            (path / HOLDER).write_text(
-                f"{os.getpid()}\n{_command()}\n{socket.gethostname()}\n", "utf-8", "replace"
-            )
+            (path / HOLDER).write_text(text, "utf-8", "replace")
         _remove_parts(path)
 
     def _lock(self) -> None:
@@ -100,10 +100,6 @@ def _of_array() -> str:
         f"; this is run {index} of a job array: give each a folder and a seed of its own, such as "
         f"--out DIR/${ARRAY} --seed ${ARRAY}"
     )  # fmt: skip
-
-
-def _command() -> str:
-    return shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
 
 
 def _holder(path: Path) -> str:
