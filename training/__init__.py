@@ -42,8 +42,7 @@ if TYPE_CHECKING:
     from poise.training.deploy.export.dataset import write_dataset
     from poise.training.deploy.export.export import export_policy
     from poise.training.deploy.standalone.controller import StandaloneController, load_standalone
-    from poise.training.deploy.standalone.measurement import Measurement
-    from poise.training.deploy.standalone.readings import Readings
+    from poise.training.deploy.standalone.readings import Measurement, Readings
     from poise.training.deploy.standalone.sensed import MotorCommand, SensedController
     from poise.training.learning.config import TrainConfig, train_config
     from poise.training.learning.policy import Policy, load_policy

@@ -549,7 +549,6 @@ DANGEROUS = {
         "configs/kinds.py",
         "envs/compiled/calls.py",
         "src/poise/lazy.py",
-        "training/deploy/export/libraries.py",
     },
     "exec_module": {"baselines/plugins.py"},
     "find_plugin": {"baselines/plugins.py", "training/benchmarking/trials/agents.py"},

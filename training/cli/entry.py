@@ -15,7 +15,7 @@ import poise
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
 from poise.training.running.options.arguments import check_flags
 from poise.training.running.options.pages import print_commands
-from poise.training.running.options.parsing import parsed
+from poise.training.running.options.parsing import answered
 from poise.training.running.options.spelling import respelled, suggestion
 from poise.training.running.stopping import (
     exit_at_once,
@@ -27,6 +27,7 @@ from poise.training.running.stopping import (
 from poise.training.running.terminal import speak_plainly, terminal
 
 from .commands import COMMANDS
+from .policies import run as run_policies
 
 SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
 HELP = ("-h", "--help", "--help-all")
@@ -80,15 +81,11 @@ def _stoppable(args: list[str]) -> int:
             raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
         if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):
             raise PoiseError("no folder takes temporary files: set TMPDIR to one") from None
-        if isinstance(error, MemoryError) or _is_mujoco_full(error):
+        mujoco_full = type(error).__name__ == "FatalError" and "allocate memory" in str(error)
+        if isinstance(error, MemoryError) or mujoco_full:
             raise PoiseError("there is not enough memory: fewer workers, and in a training fewer "
                              "environments (--ppo.n-envs), take less") from None  # fmt: skip
         raise
-
-
-def _is_mujoco_full(error: BaseException) -> bool:
-    """True for MuJoCo's own error of too little memory."""
-    return type(error).__name__ == "FatalError" and "allocate memory" in str(error)
 
 
 def command() -> None:
@@ -113,19 +110,12 @@ def _unread(stream: TextIO | None) -> bool:
     return bool(poll.poll(0))
 
 
-def _shell(given: list[str]) -> str:
-    """The shell that a completion is asked for; raises ConfigError for any other."""
-    if len(given) != 1 or given[0] not in SHELLS:
-        raise ConfigError("needs a shell", field="print-completion", choices=SHELLS)
-    return given[0]
-
-
 def _run(args: list[str]) -> int:
     if args == ["--version"]:
         print(f"poise {poise.__version__}")
         return 0
     if args[:1] == ["--print-completion"]:
-        return _complete(_shell(args[1:]))
+        return _complete(args[1:])
     if not args or args[0] in HELP:
         print_commands(USAGE, COMMANDS, terminal())
         return 0
@@ -147,18 +137,16 @@ def _run(args: list[str]) -> int:
 
         return run_motion(given)
     if name == "policies":  # it has one, too
-        from .policies import run as run_policies
-
         return run_policies(given)
-    given = ["--help" if arg == "--help-all" else arg for arg in given]  # all there is
-    code = parsed(COMMANDS[name], given, f"poise {name}")()
-    return code if isinstance(code, int) else 0
+    return answered(COMMANDS[name], given, f"poise {name}")
 
 
-def _complete(shell: str) -> int:
+def _complete(given: list[str]) -> int:
     """Print the script by which a shell completes commands and options."""
+    if len(given) != 1 or given[0] not in SHELLS:
+        raise ConfigError("needs a shell", field="print-completion", choices=SHELLS)
     with contextlib.suppress(SystemExit):
         tyro.extras.subcommand_cli_from_dict(
-            COMMANDS, prog="poise", args=["--tyro-print-completion", shell]
+            COMMANDS, prog="poise", args=["--tyro-print-completion", *given]
         )
     return 0

@@ -1,6 +1,6 @@
 """`poise policies`: those of others, known and checked; policies, and what they do, written."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +8,7 @@ import tyro
 
 from poise.configs.errors import ConfigError, shown
 from poise.training.running.options.arguments import Allow, OnRobot, PolicyName
-from poise.training.running.options.parsing import parsed
+from poise.training.running.options.parsing import answered
 from poise.training.running.terminal import terminal
 
 Checked = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -52,15 +52,11 @@ def check(
 
 def run(args: Sequence[str]) -> int:
     """Run `poise policies`: the list, or the sub-command `check`."""
-    command: Callable[..., object] = show
-    name, given = "poise policies", list(args)
     if args and args[0] == "check":
-        command, name, given = check, "poise policies check", list(args[1:])
-    elif args and not args[0].startswith("-"):
+        return answered(check, args[1:], "poise policies check")
+    if args and not args[0].startswith("-"):
         raise ConfigError(f"no such command: policies {shown(args[0])}", choices=("check",))
-    given = ["--help" if arg == "--help-all" else arg for arg in given]
-    code = parsed(command, given, name)()
-    return code if isinstance(code, int) else 0
+    return answered(show, args, "poise policies")
 
 
 def export(

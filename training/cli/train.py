@@ -20,10 +20,10 @@ from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.statistics.differences import difference
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.learning.config import TrainConfig, train_config
-from poise.training.learning.policy_files import STATE, find_checkpoint, read_state
+from poise.training.learning.policy_files import BEST, LAST, STATE, find_checkpoint, read_state
 from poise.training.learning.seeds.records import SEEDS, Evaluation, evaluations, start_and_best
 from poise.training.learning.seeds.train import train_seeds
-from poise.training.learning.train import BEST, LAST, train
+from poise.training.learning.train import train
 from poise.training.running.executor import Backend
 from poise.training.running.options.described import Option, kind_of, options_of, sentences
 from poise.training.running.options.pages import grouped, print_options
@@ -175,14 +175,11 @@ def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
 
 def options(config: TrainConfig) -> list[Option]:
     """All options: the command's own, then the fields of the configuration."""
-    own = Command(config)
-    mine = {f.name: f.default for f in fields(Command) if f.name != "settings"}
-    told, hints = sentences(Command), get_type_hints(Command)
-    kinds = {name: "" if isinstance(default, bool) else kind_of(hints[name])
-             for name, default in mine.items()}  # fmt: skip
-    return [Option(f"--{name}", kinds[name], told[name], "") for name in mine] + [
-        *options_of(own.settings)
-    ]
+    told, hints, own = sentences(Command), get_type_hints(Command), []
+    for name, default in ((f.name, f.default) for f in fields(Command) if f.name != "settings"):
+        kind = "" if isinstance(default, bool) else kind_of(hints[name])
+        own.append(Option(f"--{name}", kind, told[name], ""))
+    return [*own, *options_of(config)]
 
 
 def print_help(config: TrainConfig, everything: bool) -> None:

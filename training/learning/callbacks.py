@@ -1,28 +1,26 @@
 """Callbacks beside the learning: evaluation, checkpoints, progress."""
 
-import csv
-import io
 import time
 from collections import deque
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.configs.files import write_atomic
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.reward import REWARD_TERMS
 from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.robots.robot import Robot
-from poise.training.running.terminal import ProgressLines
+from poise.training.running.files import csv_text
+from poise.training.running.terminal import ProgressLines, steps_bar
 
 from .checkpoints import save_checkpoint
 from .config import TrainConfig
-from .policy_files import controller_fingerprint
+from .policy_files import BEST, KEPT, LAST, controller_fingerprint
 from .vec_env import ThreadedVecEnv
 
 
@@ -51,13 +49,6 @@ class Throughput(BaseCallback):
         return True
 
 
-def step_terms(envs: VecEnv) -> np.ndarray:
-    """(terms,) of the reward in the last step, means over the environments."""
-    inner = envs.unwrapped
-    assert isinstance(inner, ThreadedVecEnv)
-    return inner.reward_terms.mean(axis=0)
-
-
 class RewardTerms(BaseCallback):
     """Logs the weighted terms of the reward, means over the policy steps of a rollout."""
 
@@ -66,7 +57,9 @@ class RewardTerms(BaseCallback):
         self._sum, self._steps = np.zeros(len(REWARD_TERMS)), 0
 
     def _on_step(self) -> bool:
-        self._sum += step_terms(self.training_env)
+        envs = self.training_env.unwrapped
+        assert isinstance(envs, ThreadedVecEnv)
+        self._sum += envs.reward_terms.mean(axis=0)
         self._steps += 1
         return True
 
@@ -81,25 +74,16 @@ class RewardTerms(BaseCallback):
 class Checkpoints(BaseCallback):
     """Writes last/ after every rollout, and best/ after the best evaluation of what was trained.
 
-    With `keep_every` of the configuration a policy is also kept in `kept`/STEPS, at the start and
-    whenever so many more steps are done.
+    With `keep_every` of the configuration a policy is also kept in kept/STEPS, at the start and
+    whenever so many more steps are done. All are in the folder `out` of the run.
     """
 
     model: PPO
 
-    def __init__(
-        self,
-        config: TrainConfig,
-        robot: Robot,
-        last: Path,
-        best: Path,
-        kept: Path,
-        table: Path,
-        state: dict[str, Any],
-    ):
+    def __init__(self, config: TrainConfig, robot: Robot, out: Path, state: dict[str, Any]):
         super().__init__()
         self.config, self.robot = config, robot  # as it is described, whatever it is trained on
-        self.last, self.best, self.kept, self.table = last, best, kept, table
+        self.out = out
         self.rows: list[dict[str, float]] = list(state.get("evaluations", []))
         self._next = state.get("next_evaluation", 0)
         scores = [row["score"] for row in self.rows if row["timesteps"] > 0]
@@ -117,15 +101,15 @@ class Checkpoints(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         # the update of the rollout before is done: its weights are new
-        self._save(self.last)  # first, so that a kill in the evaluation loses nothing
+        self._save(LAST)  # first, so that a kill in the evaluation loses nothing
         self._keep()
         if self.num_timesteps >= self._next:
             self._evaluate()
-            self._save(self.last)
+            self._save(LAST)
 
     def _on_training_end(self) -> None:
         self._evaluate()
-        self._save(self.last)
+        self._save(LAST)
         self._keep()
         self.close()
 
@@ -136,7 +120,7 @@ class Checkpoints(BaseCallback):
         every, rollout = self.config.keep_every, self.model.n_steps * self.model.n_envs
         now = self.num_timesteps
         if every and now // every > (now - rollout) // every:
-            self._save(self.kept / f"{now:010d}")
+            self._save(f"{KEPT}/{now:010d}")
 
     def _evaluate(self) -> None:
         if self.rows and self.rows[-1]["timesteps"] == self.num_timesteps:
@@ -147,23 +131,18 @@ class Checkpoints(BaseCallback):
         for name, value in row.items():
             self.logger.record(f"evaluation/{name}", value)
         self.logger.dump(self.num_timesteps)
-        text = io.StringIO()
-        writer = csv.DictWriter(text, list(row), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
-        write_atomic(self.table, text.getvalue())
+        write_atomic(self.out / "evaluations.csv", csv_text(self.rows, list(row)))
         if row["score"] > self._record:
             if self.num_timesteps > 0:  # anything trained replaces the controller alone
                 self._record = row["score"]
-            self._save(self.best)
+            self._save(BEST)
 
     def _play(self) -> dict[str, float]:
         """The deterministic policy on the held-out pushes, the same at every evaluation."""
         evaluation, batch = self.config.evaluation, self._batch
         assert batch is not None  # made at the start of the training
         normalize = self._normalize()
-        recovered: list[bool] = []
-        fallen: list[bool] = []
+        ends: list[tuple[bool, bool]] = []  # whether recovered, whether fallen
         actions: list[float] = []
         seeds = np.random.SeedSequence(evaluation.seed).generate_state(evaluation.trials)
         size = len(batch.envs)
@@ -186,12 +165,11 @@ class Checkpoints(BaseCallback):
                 running = [i for i in range(counted) if i not in result]
                 actions.extend(np.abs(action[running]).mean(axis=1))
                 batch.step(action, at_end)
-            recovered.extend(result[i][0] for i in range(counted))
-            fallen.extend(result[i][1] for i in range(counted))
-        rate = float(np.mean(recovered))
+            ends.extend(result[i] for i in range(counted))
+        rate, fallen = (float(share) for share in np.mean(ends, axis=0))
         return {
             "recovered": rate,
-            "fallen": float(np.mean(fallen)),
+            "fallen": fallen,
             "mean_abs_action": float(np.mean(actions)),
             "score": rate,
         }
@@ -201,7 +179,7 @@ class Checkpoints(BaseCallback):
         assert isinstance(env, VecNormalize)
         return env
 
-    def _save(self, folder: Path) -> None:
+    def _save(self, folder: str) -> None:
         robot = self.robot
         inputs, outputs = self.model.observation_space.shape, self.model.action_space.shape
         assert inputs and outputs  # both spaces are boxes
@@ -215,7 +193,7 @@ class Checkpoints(BaseCallback):
             "next_evaluation": self._next,
             "evaluations": self.rows,
         }
-        save_checkpoint(folder, self.model, self._normalize(), self.config, state)
+        save_checkpoint(self.out / folder, self.model, self._normalize(), self.config, state)
 
     def close(self) -> None:
         """Close the environments of the evaluation."""
@@ -234,13 +212,7 @@ class Progress(BaseCallback):
         self._bar: ProgressLines | None = None
 
     def _on_training_start(self) -> None:
-        self._bar = ProgressLines(
-            TextColumn("training"),
-            BarColumn(),
-            TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),
-            TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
-        )
+        self._bar = steps_bar("training")
         self._bar.start()
         self._task = self._bar.add_task("", total=self.total, completed=self.num_timesteps, rate="")
         self._start, self._start_steps = time.perf_counter(), self.num_timesteps

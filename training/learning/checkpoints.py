@@ -94,15 +94,23 @@ def restore(
     """
     state = read_state(folder / STATE)
     check_robot(state, fingerprint, folder / STATE)
-    parameters = read_parameters(folder / POLICY)
+    parameters, own = read_parameters(folder / POLICY), model.policy.state_dict()
+    stored = parameters["policy"]
     with parsing(folder / POLICY):
-        if newest is None or not _load_into_wider(parameters["policy"], model, newest):
+        if newest is None or _shapes(stored) == _shapes(own):
             model.set_parameters(parameters, exact_match=True, device="cpu")
-    _restore_statistics(folder / STATISTICS, normalize, newest)
+        else:
+            model.policy.load_state_dict(widened(stored, own, newest))
+    restore_statistics(folder / STATISTICS, normalize, newest)
     return state
 
 
-def _restore_statistics(path: Path, normalize: VecNormalize, newest: int | None) -> None:
+def _shapes(weights: Mapping[str, Tensor]) -> dict[str, torch.Size]:
+    return {name: values.shape for name, values in weights.items()}
+
+
+def restore_statistics(path: Path, normalize: VecNormalize, newest: int | None = None) -> None:
+    """Load the moments of observations and returns into `normalize`; `newest` as of `restore`."""
     of: dict[str, Any] = {"obs": normalize.obs_rms, "ret": normalize.ret_rms}
     found = read_statistics(path, [f"{prefix}_{name}" for prefix in of for name in MOMENTS])
     if newest is not None:
@@ -129,15 +137,6 @@ def _spread(found: dict[str, np.ndarray], size: int, newest: int) -> None:
     found["obs_count"] = np.minimum(found["obs_count"], FEW)
 
 
-def _load_into_wider(stored: Mapping[str, Tensor], model: PPO, newest: int) -> bool:
-    """Load the weights if the network of `model` is another one than the stored; else False."""
-    own = model.policy.state_dict()
-    if {n: w.shape for n, w in stored.items()} == {n: w.shape for n, w in own.items()}:
-        return False
-    model.policy.load_state_dict(widened(stored, own, newest))
-    return True
-
-
 def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
     """The statistics that normalise observations and returns, as arrays."""
     arrays = {
@@ -151,8 +150,8 @@ def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
 
 
 def widened(
-    small: Mapping[str, torch.Tensor], large: Mapping[str, torch.Tensor], end: int | None = None
-) -> dict[str, torch.Tensor]:
+    small: Mapping[str, Tensor], large: Mapping[str, Tensor], end: int | None = None
+) -> dict[str, Tensor]:
     """Weights of the network `large` with which it computes what `small` does.
 
     Weights W (out, in) and biases (out,) of both, of as many layers. The units that are new keep

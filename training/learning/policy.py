@@ -20,6 +20,7 @@ from poise.envs.robots.robot import Robot, in_physics_of, load_robot, read_descr
 
 from .config import TrainConfig, train_config
 from .policy_files import (
+    BEST,
     CONFIG,
     FILES,
     POLICY,
@@ -244,7 +245,7 @@ def locate_policy(folder: str | Path | None) -> Path:
         path = packaged_folder("policies") / name
     else:
         path = Path(name)
-        path = find_checkpoint(path / "best") or find_checkpoint(path) or path
+        path = find_checkpoint(path / BEST) or find_checkpoint(path) or path
         if not is_folder(path):
             raise ConfigError(
                 "no such folder, and no packaged policy", source=path, choices=packaged("policies")

@@ -28,7 +28,7 @@ from .config import TrainConfig
 if TYPE_CHECKING:
     from torch import Tensor
 
-KEPT = "kept"  # folder of a run: its policies, by their steps
+LAST, BEST, KEPT = "last", "best", "kept"  # folders of a run; `KEPT` has policies by their steps
 POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
 FILES = (POLICY, STATISTICS, CONFIG, STATE)
 MOMENTS = ("mean", "var", "count")
@@ -42,7 +42,6 @@ RANGES = {
 }
 WEIGHT = 1e6  # the largest
 STEPS = 10**15  # of training
-_PARTS = ("policy", "policy.optimizer")  # members of policy.zip, without .pth
 _VALUES = 100_000  # in a member
 
 
@@ -136,8 +135,7 @@ def read_parameters(path: Path) -> dict[str, Any]:
 
     Raises ConfigError as `read_weights`.
     """
-    archive = read_archive(path)
-    _, optimizer = _PARTS
+    archive, optimizer = read_archive(path), "policy.optimizer"
     return {"policy": _weights(archive, path), optimizer: _member(archive, path, optimizer)}
 
 

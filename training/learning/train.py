@@ -36,11 +36,10 @@ from .curriculum import CurriculumCallback, curriculum_levels
 from .exploration import ExplorationCallback, shape_exploration
 from .imported import import_policy
 from .policy import locate_policy
-from .policy_files import CONFIG, KEPT, STATE, check_controller, find_checkpoint
+from .policy_files import BEST, CONFIG, LAST, STATE, check_controller, find_checkpoint
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 
-LAST, BEST = "last", "best"
 MAY_CHANGE = ("steps", "threads", "keep_every")  # of a configuration that a run goes on with
 
 
@@ -99,11 +98,12 @@ def train(
             state = restore(checkpoint, model, normalize, robot.fingerprint)
             check_controller(state, config, checkpoint / STATE)
             model.num_timesteps = state["timesteps"]
-            _reseed(model, normalize, config.seed + model.num_timesteps)
+            seed = config.seed + model.num_timesteps
+            model.set_random_seed(seed)
+            normalize.seed(_env_seed(seed))
         write_atomic(out / CONFIG, to_yaml(config))
         model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-        table = out / "evaluations.csv"
-        checkpoints = Checkpoints(config, robot, out / LAST, out / BEST, out / KEPT, table, state)
+        checkpoints = Checkpoints(config, robot, out, state)
         stack.callback(checkpoints.close)
         schedules = [CurriculumCallback(config), ExplorationCallback(config)]
         given = [callback] if isinstance(callback, BaseCallback) else list(callback)
@@ -235,10 +235,10 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
         robot = coarser_robot(robot, config.physics_step)
     env = config.make_training_env(robot)
     check_pushes(config, env)
-    moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(config.replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
-    if moments is not None:
+    if config.ppo.symmetric:
+        moments: Any = MirroredMeanStd(env.mirrors()[0])
         normalize.obs_rms = moments
     return normalize
 
@@ -257,11 +257,6 @@ def check_pushes(config: TrainConfig, env: BalanceEnv) -> None:
             raise ConfigError(
                 error.message, field=f"{section}.pushes.{name}", choices=error.choices
             ) from None
-
-
-def _reseed(model: PPO, env: VecNormalize, seed: int) -> None:
-    model.set_random_seed(seed)
-    env.seed(_env_seed(seed))
 
 
 def _env_seed(seed: int) -> int:

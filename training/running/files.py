@@ -13,7 +13,6 @@ SETTINGS, LOG, TRIALS, SUMMARY = "settings.yaml", "trials.jsonl", "trials.csv", 
 PLOTS = ("polar_envelope.png", "fall_probability.png")
 CURVE = "learning_curve.png"  # where policies of a run are told apart by their steps
 REPORT = "report.html"  # by `poise report`; not of the result, but gone with it
-OLD = ("trials.partial.jsonl",)  # of Poise before 0.3, which --overwrite removes
 FILES = (SUMMARY, SETTINGS, LOG, TRIALS, *PLOTS, CURVE)
 
 

@@ -16,9 +16,8 @@ from types import TracebackType
 from poise.configs.errors import PoiseError
 
 HOLDER = ".poise.lock"  # who holds the lock: of a process that was killed it says nothing
-ARRAY = (
-    "SLURM_ARRAY_TASK_ID"  # of the environment: the number of a run among several of one command
-)
+#: of the environment: the number of a run among several of one command
+ARRAY = "SLURM_ARRAY_TASK_ID"
 #: what file systems of clusters say that do not lock a folder, or nothing at all
 NO_LOCKS = (errno.EBADF, errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
@@ -47,10 +46,10 @@ class FolderLock:
             raise PoiseError(f"{path}: {_holder(path)} is writing there{_of_array()}") from None
         except OSError as error:
             raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
+        command = shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
+        text = f"{os.getpid()}\n{command}\n{socket.gethostname()}\n"
         with contextlib.suppress(OSError):  # a full disk: the run says so where it matters
-            (path / HOLDER).write_text(
-                f"{os.getpid()}\n{_command()}\n{socket.gethostname()}\n", "utf-8", "replace"
-            )
+            (path / HOLDER).write_text(text, "utf-8", "replace")
         _remove_parts(path)
 
     def _lock(self) -> None:
@@ -103,10 +102,6 @@ def _of_array() -> str:
     )  # fmt: skip
 
 
-def _command() -> str:
-    return shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
-
-
 def _holder(path: Path) -> str:
     """The process that holds the lock, in words."""
     try:
@@ -129,8 +124,6 @@ def _remove_parts(path: Path) -> None:
 def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # of another user
-        return True
+    except (OSError, OverflowError) as error:
+        return not isinstance(error, ProcessLookupError)  # else it is of another user
     return True

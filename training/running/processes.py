@@ -18,9 +18,10 @@ import threading
 import traceback
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from poise.configs.errors import PoiseError, PoiseWarning
 
@@ -103,10 +104,18 @@ class WorkerPool:
                 death = worker.death()
                 if worker.process.exitcode == UNGUARDED:
                     raise PoiseError(GUARD) from None
-                task.survive(death)
+                task.deaths += 1
+                if task.deaths > 1:
+                    raise PoiseError(
+                        f"{death}, as did another at the same work; {ADVICE}"
+                    ) from None
+                tell(f"{death}: another one does its work again")
                 waiting.appendleft(task)
                 continue
-            return task, _result(answer)
+            done, value, where = pickle.loads(answer)
+            if not done:
+                raise value from WorkerTraceback(where)
+            return task, value
 
     def _hand_out(self, waiting: deque[Task]) -> None:
         """Give tasks to the idle, and to new workers while there are fewer than `count`."""
@@ -119,18 +128,13 @@ class WorkerPool:
             self.workers[-1].give(waiting.popleft())
 
 
+@dataclass(eq=False)
 class Task(Generic[Job, Result]):
     """A job, and how many workers have died of it."""
 
-    def __init__(self, function: Callable[[Job], Result], job: Job):
-        self.function, self.job, self.deaths = function, job, 0
-
-    def survive(self, death: str) -> None:
-        """Tell of a worker's death; raises PoiseError at the second."""
-        self.deaths += 1
-        if self.deaths > 1:
-            raise PoiseError(f"{death}, as did another at the same work; {ADVICE}")
-        tell(f"{death}: another one does its work again")
+    function: Callable[[Job], Result]
+    job: Job
+    deaths: int = 0
 
 
 class Worker:
@@ -177,11 +181,16 @@ def tell(text: str) -> None:
     print(f"poise: {text}", file=sys.stderr, flush=True)
 
 
-@contextmanager
-def single_threaded() -> Iterator[None]:
+def single_threaded() -> AbstractContextManager[None]:
     """Processes started inside use one thread each for linear algebra; sums keep their order."""
-    before = {name: os.environ.get(name) for name in FOR_CHILDREN}
-    os.environ.update(dict.fromkeys(FOR_CHILDREN, "1"))
+    return environment(dict.fromkeys(FOR_CHILDREN, "1"))
+
+
+@contextmanager
+def environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Inside, the environment of this process has these variables."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     try:
         yield
     finally:
@@ -190,13 +199,6 @@ def single_threaded() -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-
-
-def _result(answer: bytes) -> Any:
-    done, value, where = pickle.loads(answer)
-    if not done:
-        raise value from WorkerTraceback(where)
-    return value
 
 
 def _serve(connection: multiprocessing.connection.Connection) -> None:

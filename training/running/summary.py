@@ -6,7 +6,7 @@ is "no such value"; a key that a suite does not measure is left out.
 
 # without `from __future__ import annotations`: TypedDict must see which keys are required
 from pathlib import Path
-from typing import Literal, TypedDict
+from typing import Literal, NotRequired, Required, TypedDict
 
 from poise.configs.errors import ConfigError, shown
 from poise.training.benchmarking.statistics.rates import SeedFigures
@@ -57,18 +57,13 @@ class Counts(Rate, total=False):
     root_force_max: Number
 
 
-class Angle(TypedDict):
-    """A direction [deg], counter-clockwise from forward."""
-
-    direction: float
-
-
-class Sector(Angle):
+class Sector(TypedDict):
     """Random pushes within 22.5° of a direction.
 
     `fraction50` is the fraction of the limit at which half of them are recovered.
     """
 
+    direction: float
     trials: int
     recovered: int
     fraction50: float
@@ -76,20 +71,16 @@ class Sector(Angle):
     fraction50_bound: Bound
 
 
-class DirectionJ50(Angle):
-    """J50 of a direction."""
-
-    trials: int
-    recovered: int
-    j50: float
-    j50_ci95: Interval
-    ankle_limit: float
-    eta: float
-
-
-class Direction(DirectionJ50, total=False):
+class Direction(TypedDict, total=False):
     """J50 and J90 of a direction, over the limits of ankles and of steps."""
 
+    direction: Required[float]
+    trials: Required[int]
+    recovered: Required[int]
+    j50: Required[float]
+    j50_ci95: Required[Interval]
+    ankle_limit: Required[float]
+    eta: Required[float]
     j50_bound: Bound
     j50_per_mass: float
     j90: Number
@@ -126,15 +117,10 @@ class EnvelopeFigures(TypedDict, total=False):
     step_share_inf_mean: float
 
 
-class LevelRate(Rate):
-    """The trials at a level."""
-
-    level: str
-
-
-class Level(LevelRate):
+class Level(Rate):
     """A level of a factor; lost and won are against the standard case."""
 
+    level: str
     standard: bool
     lost: int
     won: int
@@ -149,9 +135,10 @@ class Factor(TypedDict):
     levels: list[Level]
 
 
-class MarginFigures(Angle, total=False):
+class MarginFigures(TypedDict, total=False):
     """EUROBENCH's stability margin in a direction."""
 
+    direction: Required[float]
     impulse: Number
     force: float
     force_normalised: float
@@ -275,13 +262,14 @@ class PhaseJ50(TypedDict):
     j50_bound: Bound
 
 
-class RealismLevel(LevelRate, total=False):
+class RealismLevel(Rate, total=False):
     """The parts of a suite at a level of realism.
 
     Rates are of random pushes, else of all; `stood` are the unpushed trials without a fall;
     `j50_kept` is the J50 over that of the suite's own level, which comes first.
     """
 
+    level: Required[str]
     stood: int
     unpushed: int
     j50_mean: float
@@ -292,16 +280,11 @@ class RealismLevel(LevelRate, total=False):
     energy_median: Number
 
 
-class ScenarioCounts(Counts):
-    """Trials of a scenario."""
+class ScenarioFigures(Counts):
+    """Trials of a scenario, with the mean speed of a walk [m/s], see `Outcome`."""
 
     scenario: str
-
-
-class ScenarioFigures(ScenarioCounts, total=False):
-    """The same, with the mean speed of a walk [m/s], see `Outcome`."""
-
-    speed_ahead: Number
+    speed_ahead: NotRequired[Number]
 
 
 class Fractions(TypedDict, total=False):
@@ -313,13 +296,6 @@ class Fractions(TypedDict, total=False):
     sectors: list[Sector]
 
 
-class Played(Rate):
-    """The number of trials played, and of those in which the controller raised."""
-
-    played: int
-    errors: int
-
-
 class Loss(TypedDict):
     """How many of the lost trials have a cause, see `training/benchmarking/diagnosis`."""
 
@@ -327,12 +303,13 @@ class Loss(TypedDict):
     trials: int
 
 
-class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
-    """A controller. The counts are of the part that is rated, else of all trials; `losses` are of
-    all trials, the most frequent cause first."""
+class Entry(Counts, EnvelopeFigures, Fractions, total=False):
+    """A controller. The counts are of the part that is rated, else of all trials; `played`,
+    `errors`, in which it raised, and `losses`, the most frequent cause first, are of all."""
 
+    played: Required[int]
+    errors: Required[int]
     losses: list[Loss]
-
     tick_us: Number
     fingerprint: str
     timesteps: int
@@ -358,23 +335,19 @@ class Paired(TypedDict, total=False):
     rate_gain_ci95: Interval
 
 
-class DirectionGain(Angle):
+class DirectionGain(TypedDict):
     """The gain in one direction."""
 
+    direction: float
     j50_gain: Number
     j50_gain_ci95: Interval
 
 
-class Names(TypedDict):
-    """Two controllers."""
+class Pair(Paired, total=False):
+    """Controller b against a on the rated trials, and on all that both met."""
 
-    a: str
-    b: str
-
-
-class Pair(Names, Paired, total=False):
-    """b against a on the rated trials, and on all that both met."""
-
+    a: Required[str]
+    b: Required[str]
     all: Paired | None
     identical: bool
     j50_gain: Number
@@ -382,17 +355,12 @@ class Pair(Names, Paired, total=False):
     directions: list[DirectionGain]
 
 
-class SeedNames(TypedDict):
-    """Runs of one configuration that differ in the seed alone."""
+class SeedGroup(TypedDict, total=False):
+    """Runs of one configuration that differ in the seed alone, and their figures."""
 
-    name: str
-    members: list[str]
-    seeds: list[int]
-
-
-class SeedGroup(SeedNames, total=False):
-    """Their figures."""
-
+    name: Required[str]
+    members: Required[list[str]]
+    seeds: Required[list[int]]
     j50_mean: SeedFigures
     eta: SeedFigures
     recovered: SeedFigures
@@ -424,15 +392,10 @@ class RobotFigures(TypedDict):
     ankle_limit: list[tuple[float, float]]
 
 
-class PlayedAt(TypedDict, total=False):
-    """The level of realism of a suite, where that is not ideal."""
+class Summary(Circumstances):
+    """summary.json; `realism` is the level of a suite where that is not ideal."""
 
-    realism: str
-
-
-class Summary(Circumstances, PlayedAt):
-    """summary.json."""
-
+    realism: NotRequired[str]
     format: int
     suite: str
     seed: int

@@ -116,6 +116,19 @@ def progress_bar(console: Console) -> Progress:
     )
 
 
+def steps_bar(label: str, console: Console | None = None) -> ProgressLines:
+    """A bar, or lines, with steps of a training, rates (its field `rate`) and the time left."""
+    return ProgressLines(
+        TextColumn(label),
+        BarColumn(),
+        TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=console is not None and console.quiet,
+    )
+
+
 def print_paths(paths: Sequence[Path], console: Console) -> None:
     """Print one path a line, whole, as it is to be copied."""
     for path in paths:

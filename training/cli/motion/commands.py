@@ -17,7 +17,7 @@ from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.options.arguments import OnRobot, Switch
 from poise.training.running.options.pages import print_commands
-from poise.training.running.options.parsing import parsed
+from poise.training.running.options.parsing import answered
 from poise.training.running.terminal import terminal
 
 from .check import check, follow
@@ -277,9 +277,7 @@ def run(args: Sequence[str]) -> int:
     if name not in MOTION:
         raise ConfigError(f"no such command: motion {shown(name)}{meant(name, MOTION)}",
                           choices=MOTION)  # fmt: skip
-    given = ["--help" if arg == "--help-all" else arg for arg in args[1:]]
-    code = parsed(MOTION[name], given, f"poise motion {name}")()
-    return code if isinstance(code, int) else 0
+    return answered(MOTION[name], args[1:], f"poise motion {name}")
 
 
 def named_joints(joints: Sequence[str]) -> dict[str, str]:

@@ -98,30 +98,13 @@ def card(
     environment = IDS[policy.config.action]
     head |= {"library_name": "stable-baselines3", "tags": [environment, *TAGS]}
     if figures:
-        head["model-index"] = [{"name": name, "results": [_result(environment, figures)]}]
-    text = yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=1000)
-    return f"---\n{text}---\n\n{_page(name, archive, policy, env, figures, notice)}"
-
-
-def _result(environment: str, figures: Sequence[Figure]) -> dict[str, Any]:
-    """An entry of the model-index, in the form that huggingface_sb3 writes."""
-    task = "reinforcement-learning"
-    return {
-        "task": {"type": task, "name": task},
-        "dataset": {"name": environment, "type": environment},
-        "metrics": [{"type": f.key, "value": f.value, "name": f.name} for f in figures],
-    }
-
-
-def _page(
-    name: str,
-    archive: str,
-    policy: Policy,
-    env: BalanceEnv,
-    figures: Sequence[Figure],
-    notice: str,
-) -> str:
-    environment = IDS[policy.config.action]
+        task = "reinforcement-learning"
+        result = {  # in the form that huggingface_sb3 writes
+            "task": {"type": task, "name": task},
+            "dataset": {"name": environment, "type": environment},
+            "metrics": [{"type": f.key, "value": f.value, "name": f.name} for f in figures],
+        }
+        head["model-index"] = [{"name": name, "results": [result]}]
     below = ""
     if isinstance(env, ResidualBalanceEnv):
         below = f" It moves the targets of the controller {code(policy.config.controller)}, which"
@@ -133,7 +116,7 @@ def _page(
     lines = [f"| {plain(f.name)} | {f.text} |" for f in figures]
     table = "\n".join(["| figure | |", "| --- | --- |", *lines, "", ""]) if figures else ""
     values = ", ".join(f"{key} = {value:.6g}" for key, value in units(env).items())
-    return PAGE.format(
+    page = PAGE.format(
         name=plain(name),
         what="A policy that keeps a humanoid on its feet while it is pushed.",
         robot=code(env.robot.name),
@@ -150,3 +133,5 @@ def _page(
         action="\n".join(rows),
         notice=f"\n## Origin\n\n{html.escape(notice, quote=False)}" if notice else "",
     )
+    text = yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=1000)
+    return f"---\n{text}---\n\n{page}"

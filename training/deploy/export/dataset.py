@@ -1,10 +1,8 @@
 """Trials of a suite as a data set of Minari: what was observed, done, earned and pushed."""
 
-import contextlib
-import os
 import re
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ import numpy as np
 
 from poise.baselines.allowance import allowing, named
 from poise.configs.errors import ConfigError, shown
+from poise.configs.extras import needing
 from poise.configs.files import new_folder
 from poise.envs.balance.plain_info import push_arrays
 from poise.envs.robots.robot import load_robot
@@ -20,11 +19,9 @@ from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.benchmarking.trials.trial import Trial
+from poise.training.running.processes import environment
 
-from .libraries import library
-
-MODULES = ("minari", "minari.data_collector.episode_buffer")
-PLACE = "MINARI_DATASETS_PATH"
+PLACE = "MINARI_DATASETS_PATH"  # of Minari's data sets
 NAME = re.compile(r"[\w.-]+/[\w./-]+-v\d+")
 
 
@@ -60,7 +57,9 @@ def write_dataset(
     Raises:
         ConfigError: Minari is not installed, a name is not valid, a folder is not empty.
     """
-    minari, buffers = (library(each, "dataset") for each in MODULES)
+    with needing("dataset", "dataset"):
+        import minari
+        from minari.data_collector.episode_buffer import EpisodeBuffer
     if NAME.fullmatch(name) is None:
         raise ConfigError(f"must be such as poise/pushes-v0, not {shown(name)}", field="name")
     chosen, known = load_suite(suite), load_robot(robot)
@@ -70,30 +69,20 @@ def write_dataset(
         given: dict[str, Any] = {"duration": chosen.duration, "pushes": None, "noise": chosen.noise}
         agent = load_agent(controller, known, **given)
         plan = Plan(chosen, load_limits(known), seed, [controller])
-        episodes = [_episode(agent, trial, buffers.EpisodeBuffer) for trial in plan.first]
+        episodes = [_episode(agent, trial, EpisodeBuffer) for trial in plan.first]
     won = sum(bool(each.infos["is_success"][-1]) for each in episodes)
-    with new_folder(out) as folder, _minari_writes_to(folder):
+    with (
+        new_folder(out) as folder,
+        environment({PLACE: str(folder.resolve())}),
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore", UserWarning)  # advice to publishers
         minari.create_dataset_from_buffers(
             dataset_id=name, buffer=episodes, algorithm_name=controller,
             action_space=agent.env.action_space, observation_space=agent.env.observation_space,
             description=f"{controller} on {known.name}, suite {suite}, seed {seed}; Poise",
         )  # fmt: skip
     return {"episodes": len(episodes), "steps": sum(map(len, episodes)), "recovered": won}
-
-
-@contextlib.contextmanager
-def _minari_writes_to(folder: Path) -> Iterator[None]:
-    """Within it Minari's data sets are in this folder, and it gives no advice to publishers."""
-    before = os.environ.get(PLACE)
-    os.environ[PLACE] = str(folder.resolve())
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            yield
-    finally:
-        os.environ.pop(PLACE)
-        if before is not None:
-            os.environ[PLACE] = before
 
 
 def _episode(agent: Agent, trial: Trial, buffer: Any) -> Any:

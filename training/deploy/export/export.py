@@ -3,7 +3,7 @@
 import json
 import os
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import allows
+from poise.configs.extras import needing
 from poise.configs.files import check_new_folder, new_folder, packaged
 from poise.configs.reading import MIB, is_file, read_bytes, read_text
 from poise.configs.schema import build, read_yaml
-from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import load_robot
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.policy import ACTOR, Policy, load_policy, locate_policy
@@ -22,8 +22,7 @@ from poise.training.learning.policy_files import CONFIG, FILES
 
 from .card import card
 from .check import check_onnx
-from .figures import Figure, figures
-from .libraries import check_libraries, library
+from .figures import figures
 from .metadata import IDS, metadata
 from .onnx_graph import narrowed, onnx_bytes
 from .stock import write_stock
@@ -68,47 +67,43 @@ def export_policy(
             which computes with 32 bits); the folder cannot be written.
     """
     check_new_folder(out)
-    check_libraries()
+    with needing("export", "export"):
+        import onnx  # noqa: F401
+        import onnxruntime  # noqa: F401
+        import safetensors  # noqa: F401
     source, name = locate_policy(policy), _name(policy)
-    loaded, env = _load(source, allow)
-    found = figures(loaded, str(policy), env.robot, result)
+    config = source / CONFIG
+    robot = load_robot(build(TrainConfig, read_yaml(config), str(config)).robot)  # once for all
+    loaded = load_policy(source, robot, allow=allow)
+    env = loaded.make_env(robot=robot)
+    found = figures(loaded, str(policy), robot, result)
     if licence is None and str(policy) in packaged("policies"):
         licence = OURS
     # as huggingface_sb3 names it
     archive = f"ppo-{IDS[loaded.config.action].replace('/', '-')}.zip"
     notice = read_text(source / NOTICE, MIB) if is_file(source / NOTICE) else ""
     with new_folder(out) as part:
-        worst = _write_networks(part, loaded, env)
+        said = metadata(loaded, env)
+        (part / ONNX).write_bytes(onnx_bytes(loaded, said))
+        (part / TENSORS).write_bytes(safetensors_bytes(loaded, said))
+        worst = check_onnx(part / ONNX, loaded)
         write_stock(part, archive, loaded, env, source)
         _copy(FILES, source, part / OWN)
         _copy([n for n in (NOTICE, LICENCE) if is_file(source / n)], source, part)
         (part / "config.json").write_text(_settings(part / archive), "utf-8")
-        (part / "results.json").write_text(_results(found), "utf-8")
+        # huggingface_sb3's words where it has one; returns are not measured
+        results = {"is_deterministic": True, "figures": [asdict(figure) for figure in found]}
+        text = json.dumps(results, indent=1, ensure_ascii=False) + "\n"
+        (part / "results.json").write_text(text, "utf-8")
         page = card(name, archive, loaded, env, found, licence, notice)
         (part / "README.md").write_text(page, "utf-8")
     return worst
-
-
-def _load(source: Path, allow: str | Iterable[str]) -> tuple[Policy, BalanceEnv]:
-    """The policy and its environment, whose robot is loaded once."""
-    config = source / CONFIG
-    robot = load_robot(build(TrainConfig, read_yaml(config), str(config)).robot)
-    policy = load_policy(source, robot, allow=allow)
-    return policy, policy.make_env(robot=robot)
 
 
 def _name(policy: str | Path) -> str:
     """The policy's name: of a run, that of its folder."""
     path = Path(os.path.abspath(policy))  # not resolved: a link's name is as good as another
     return path.parent.name if path.name in ("best", "last") else path.name
-
-
-def _write_networks(folder: Path, policy: Policy, env: BalanceEnv) -> float:
-    """The ONNX file, which is checked, and the tensors."""
-    said = metadata(policy, env)
-    (folder / ONNX).write_bytes(onnx_bytes(policy, said))
-    (folder / TENSORS).write_bytes(safetensors_bytes(policy, said))
-    return check_onnx(folder / ONNX, policy)
 
 
 def _copy(names: Iterable[str], source: Path, folder: Path) -> None:
@@ -123,12 +118,6 @@ def _settings(archive: Path) -> str:
         said: dict[str, Any] = json.loads(members.read("data"))
         said["system_info"] = members.read("system_info.txt").decode()
     return json.dumps(said) + "\n"
-
-
-def _results(found: Sequence[Figure]) -> str:
-    """results.json; its words are huggingface_sb3's where it has one. Returns are not measured."""
-    said = {"is_deterministic": True, "figures": [asdict(figure) for figure in found]}
-    return json.dumps(said, indent=1, ensure_ascii=False) + "\n"
 
 
 def tensors(policy: Policy) -> dict[str, np.ndarray]:
@@ -154,4 +143,6 @@ def tensors(policy: Policy) -> dict[str, np.ndarray]:
 
 def safetensors_bytes(policy: Policy, metadata: Mapping[str, str]) -> bytes:
     """The file of `tensors` with these metadata; the same policy gives the same bytes."""
-    return bytes(library("safetensors.numpy").save(tensors(policy), metadata=dict(metadata)))
+    from safetensors.numpy import save
+
+    return bytes(save(tensors(policy), metadata=dict(metadata)))

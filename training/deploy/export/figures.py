@@ -12,7 +12,6 @@ from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning.policy import Policy
 from poise.training.running.columns import J50_MEAN
 from poise.training.running.files import SUMMARY
-from poise.training.running.summary import Entry, Summary
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,12 @@ def _met(row: object, policy: Policy) -> bool:
 def _of_result(fingerprint: str, path: Path) -> list[Figure]:
     path = path / SUMMARY if is_folder(path) else path
     summary = read_summary(path)
-    entry = _entry(summary, fingerprint, path)
+    entries = summary["controllers"].values()
+    entry = next((each for each in entries if each.get("fingerprint") == fingerprint), None)
+    if entry is None:
+        raise ConfigError("this policy took no part: no controller has its fingerprint",
+                          source=path, field="controllers",
+                          choices=summary["controllers"])  # fmt: skip
     source = f"suite {summary['suite']}, seed {summary['seed']}, robot {summary['robot']['name']}"
     low, high = entry["recovered_ci95"]
     rate = f"{entry['recovered_rate']:.1%} of {entry['trials']}"
@@ -85,11 +89,3 @@ def _of_result(fingerprint: str, path: Path) -> list[Figure]:
 
 def _interval(low: float | None, high: float | None, form: str) -> str:
     return " to ".join("unknown" if end is None else f"{end:{form}}" for end in (low, high))
-
-
-def _entry(summary: Summary, fingerprint: str, path: Path) -> Entry:
-    for entry in summary["controllers"].values():
-        if entry.get("fingerprint") == fingerprint:
-            return entry
-    raise ConfigError("this policy took no part: no controller has its fingerprint", source=path,
-                      field="controllers", choices=summary["controllers"])  # fmt: skip

@@ -4,7 +4,7 @@ Words are mjlab's where it has one, see `policy_files/metadata.py`: lists have c
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -50,7 +50,7 @@ def actions(env: BalanceEnv) -> list[Action]:
             for name, scale in scales.items()
             if scale > 0.0
         ]
-    motors = [env.robot.model.actuator(i).name for i in range(env.robot.model.nu)]
+    motors = env.robot.motor_names
     if isinstance(env, ResidualWholeEnv):
         authority = Action("authority", 2.0, "1, within 0 and 1")
         return [*residual, *_motors(motors, env.servos.reach, "rad"), authority]
@@ -63,7 +63,7 @@ def actions(env: BalanceEnv) -> list[Action]:
     return _motors(motors, env.robot.torque_limit, "N·m")
 
 
-def _motors(names: list[str], scales: np.ndarray, unit: str) -> list[Action]:
+def _motors(names: Sequence[str], scales: np.ndarray, unit: str) -> list[Action]:
     return [Action(name, float(scale), unit) for name, scale in zip(names, scales, strict=True)]
 
 

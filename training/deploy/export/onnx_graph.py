@@ -1,14 +1,13 @@
 """A policy as an ONNX graph: raw observations in, actions out."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from poise.envs.robots.mirror import Mirror
 from poise.training.learning.policy import Policy
-
-from .libraries import library
 
 OPSET, IR = 17, 8  # what runtimes of 2022 read
 INPUT, OUTPUT = "obs", "actions"  # the names that mjlab and rsl_rl give them
@@ -23,7 +22,8 @@ def onnx_bytes(policy: Policy, metadata: Mapping[str, str]) -> bytes:
     limits of the action are part of the graph. In between it computes with 64 bits, as `predict`
     does. Weights are stored with 32 bits where these hold them exactly.
     """
-    onnx = library("onnx")
+    import onnx
+
     graph = _Graph()
     graph.add_policy(policy)
     ends = [
@@ -47,20 +47,36 @@ class _Graph:
     """Nodes and tensors, added one after the other; an edge is the name of its values."""
 
     def __init__(self) -> None:
-        self.onnx = library("onnx")
+        import onnx
+
+        self.onnx = onnx
         self.nodes: list[Any] = []
         self.tensors: list[Any] = []
 
     def add_policy(self, policy: Policy) -> None:
         """What `Policy.predict` computes, from `INPUT` to `OUTPUT`."""
-        network = _Network(self, policy)
+        shift, scale = self.array("mean", policy.mean), self.array("scale", policy.scale)
+        *hidden, last = [
+            (self.array(f"layer{i}.weight", weight), self.array(f"layer{i}.bias", bias))
+            for i, (weight, bias) in enumerate(policy.layers)
+        ]
+        activate = self.elu if policy.config.ppo.activation == "elu" else partial(self.op, "Tanh")
+
+        def mean(observation: str) -> str:
+            """The mean action, before its limits; a symmetric policy passes the layers twice."""
+            x = self.op("Mul", self.op("Sub", observation, shift), scale)
+            x = self.op("Clip", x, self.number(-policy.clip), self.number(policy.clip))
+            for weight, bias in hidden:
+                x = activate(self.op("Gemm", x, weight, bias))
+            return self.op("Gemm", x, *last)
+
         seen = self.wide(INPUT)
-        mean = network.mean(seen)
+        action = mean(seen)
         if policy.mirrors is not None:
             see, do = policy.mirrors
-            image = self.mirror(do, network.mean(self.mirror(see, seen, "see")), "do")
-            mean = self.op("Mul", self.op("Add", mean, image), self.number(0.5))
-        action = self.op("Clip", mean, self.number(-1.0), self.number(1.0))
+            image = self.mirror(do, mean(self.mirror(see, seen, "see")), "do")
+            action = self.op("Mul", self.op("Add", action, image), self.number(0.5))
+        action = self.op("Clip", action, self.number(-1.0), self.number(1.0))
         self.op("Cast", action, to=self.onnx.TensorProto.FLOAT, output=OUTPUT)
 
     def op(self, kind: str, *inputs: str, output: str = "", **attributes: Any) -> str:
@@ -93,39 +109,11 @@ class _Graph:
         picked = self.op("Gather", values, order.name, axis=1)
         return self.op("Mul", picked, self.array(f"{name}.sign", mirror.sign))
 
-
-class _Network:
-    """The layers of a policy, which a symmetric one passes twice."""
-
-    def __init__(self, graph: _Graph, policy: Policy):
-        self.graph = graph
-        self.shift = graph.array("mean", policy.mean)
-        self.scale = graph.array("scale", policy.scale)
-        self.limit = policy.clip
-        self.layers = [
-            (graph.array(f"layer{i}.weight", weight), graph.array(f"layer{i}.bias", bias))
-            for i, (weight, bias) in enumerate(policy.layers)
-        ]
-        self.activation = {"tanh": self.tanh, "elu": self.elu}[policy.config.ppo.activation]
-
-    def mean(self, observation: str) -> str:
-        """The mean action for observations, before its limits."""
-        graph = self.graph
-        x = graph.op("Mul", graph.op("Sub", observation, self.shift), self.scale)
-        x = graph.op("Clip", x, graph.number(-self.limit), graph.number(self.limit))
-        for weight, bias in self.layers[:-1]:
-            x = self.activation(graph.op("Gemm", x, weight, bias))
-        return graph.op("Gemm", x, *self.layers[-1])
-
-    def tanh(self, x: str) -> str:
-        return self.graph.op("Tanh", x)
-
     def elu(self, x: str) -> str:
         """max(x, 0) + exp(min(x, 0)) − 1: runtimes have Elu with 32 bits only."""
-        graph = self.graph
-        below = graph.op("Exp", graph.op("Min", x, graph.number(0.0)))
-        below = graph.op("Sub", below, graph.number(1.0))
-        return graph.op("Add", graph.op("Max", x, graph.number(0.0)), below)
+        below = self.op("Exp", self.op("Min", x, self.number(0.0)))
+        below = self.op("Sub", below, self.number(1.0))
+        return self.op("Add", self.op("Max", x, self.number(0.0)), below)
 
 
 def narrowed(values: np.ndarray) -> np.ndarray:

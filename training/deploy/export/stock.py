@@ -4,18 +4,16 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.mirror import Mirror
-from poise.training.learning.checkpoints import LEFT_OUT, plain
+from poise.training.learning.checkpoints import LEFT_OUT, plain, restore_statistics
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.policy import Policy
 from poise.training.learning.policy_files import (
-    MOMENTS,
     POLICY,
     STATISTICS,
     read_statistics,
@@ -46,7 +44,10 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
     stored = {name: values.numpy() for name, values in read_weights(source / POLICY).items()}
     weights, config = _ordinary(stored, policy)
     normalize = VecNormalize(ThreadedVecEnv([env]), gamma=config.ppo.gamma)
-    _set_statistics(normalize, source)
+    restore_statistics(source / STATISTICS, normalize)
+    limits = read_statistics(source / STATISTICS, ("clip_obs", "epsilon"))
+    normalize.clip_obs, normalize.epsilon = (float(value) for value in limits.values())
+    normalize.training = normalize.norm_reward = False  # it no longer learns, and leaves rewards
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a batch that one environment cannot fill
         model = make_model(config, normalize)
@@ -72,18 +73,6 @@ def _ordinary(weights: Weights, policy: Policy) -> tuple[Weights, TrainConfig]:
 
 def _twice(widths: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(2 * width for width in widths)
-
-
-def _set_statistics(normalize: Any, source: Path) -> None:
-    """Give SB3's normalisation the policy's numbers; it no longer learns, and leaves rewards."""
-    moments = {"obs": normalize.obs_rms, "ret": normalize.ret_rms}
-    names = [f"{prefix}_{name}" for prefix in moments for name in MOMENTS]
-    found = read_statistics(source / STATISTICS, [*names, "clip_obs", "epsilon"])
-    for prefix, of in moments.items():
-        for name in MOMENTS:
-            setattr(of, name, found[f"{prefix}_{name}"][()])
-    normalize.clip_obs, normalize.epsilon = float(found["clip_obs"]), float(found["epsilon"])
-    normalize.training = normalize.norm_reward = False
 
 
 def both_sides(weights: Mapping[str, np.ndarray], see: Mirror, do: Mirror) -> Weights:

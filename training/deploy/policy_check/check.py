@@ -1,7 +1,7 @@
 """All that is found out about a policy of somebody else on a robot."""
 
 import hashlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -128,10 +128,10 @@ def _layouts(sizes: Sizes, joints: int) -> list[Layout]:
 
 def _unsaid(config: PolicyFileConfig) -> tuple[str, ...]:
     """Fields of `WORDS` that are as they are where nothing says them, which is seldom right."""
-    defaults = {each.name: each.default for each in fields(PolicyFileConfig)}
+    usual = PolicyFileConfig()
     named = config.joints or config.motors
     return tuple(
         name
         for name in ("joints", "default", "stiffness", "damping")
-        if getattr(config, name) == defaults[name] and not (name == "joints" and named)
+        if getattr(config, name) == getattr(usual, name) and not (name == "joints" and named)
     )

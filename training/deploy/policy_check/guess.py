@@ -1,5 +1,6 @@
 """What a network's sizes tell of its observation, where nothing describes it."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -50,7 +51,6 @@ class Layout:
     terms: tuple[str, ...]
     frame: int
     steps: int
-    joints: int
 
     def __str__(self) -> str:
         whole = self.frame * self.steps
@@ -77,10 +77,7 @@ def _numbers(shape: list[object]) -> int | None:
     """The numbers of an input or output; axes left open are the batch's, but for the last."""
     if shape and not isinstance(shape[-1], int):
         return None
-    whole = 1
-    for size in shape:
-        whole *= size if isinstance(size, int) else 1
-    return whole
+    return math.prod(size for size in shape if isinstance(size, int))
 
 
 def layouts(size: int, actions: int, joints: int) -> Iterator[Layout]:
@@ -99,4 +96,4 @@ def layouts(size: int, actions: int, joints: int) -> Iterator[Layout]:
             frame = 6 + 2 * n + actions + more
             if frame * steps == size:
                 own = (f"joint_pos_rel {n}", f"joint_vel {n}", f"last_action {actions}")
-                yield Layout((*(f"{each} 3" for each in ALWAYS), *names, *own), frame, steps, n)
+                yield Layout((*(f"{each} 3" for each in ALWAYS), *names, *own), frame, steps)

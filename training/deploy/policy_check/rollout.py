@@ -1,6 +1,7 @@
 """A rollout that a policy's maker recorded, and what it tells of a description."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -51,10 +52,8 @@ def read_rollout(path: Path) -> Rollout:
     Raises ConfigError for a file without the first two, and for arrays of other shapes.
     """
     arrays = read_arrays(path, ("observations", "actions"))
-    try:
+    with suppress(ConfigError):  # states need not be told
         arrays |= read_arrays(path, ("qpos", "qvel"))
-    except ConfigError:
-        pass  # states are not told
     rollout = Rollout(**{name: np.squeeze(values) for name, values in arrays.items()})
     steps = {len(values) for values in arrays.values()}
     if len(steps) != 1 or rollout.observations.ndim != 2 or rollout.actions.ndim != 2:
@@ -72,7 +71,7 @@ def compare(policy: PolicyFile, rollout: Rollout, source: Path) -> list[Finding]
     """
     if len(policy.observer.sizes) != 1:
         raise ConfigError("a rollout of one input can be compared, not of several", source=source)
-    sizes = policy.observer.sizes[policy_input(policy)], len(policy.action)
+    sizes = *policy.observer.sizes.values(), len(policy.action)
     given = rollout.observations.shape[1], rollout.actions.shape[1]
     if sizes != given:
         raise ConfigError(f"has {given[0]} observations and {given[1]} actions, the description "
@@ -80,15 +79,10 @@ def compare(policy: PolicyFile, rollout: Rollout, source: Path) -> list[Finding]
     return [_network(policy, rollout), *_terms(policy, rollout)]
 
 
-def policy_input(policy: PolicyFile) -> str:
-    """The name of its only input."""
-    return next(iter(policy.observer.sizes))
-
-
 def _network(policy: PolicyFile, rollout: Rollout) -> Finding:
     """Whether the network answers as it did."""
     policy.network.reset()
-    name = policy_input(policy)
+    (name,) = policy.observer.sizes
     answers = [policy.network.act({name: each})["action"] for each in rollout.observations]
     policy.network.reset()
     worst = float(np.max(np.abs(np.array(answers) - rollout.actions)))
@@ -97,7 +91,8 @@ def _network(policy: PolicyFile, rollout: Rollout) -> Finding:
 
 def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
     """Each term of the observation, at the first place of each age."""
-    for place in policy.observer.places()[policy_input(policy)]:
+    (places,) = policy.observer.places().values()
+    for place in places:
         shown = rollout.observations[:, place.start : place.start + place.size]
         where = f"{place.term.term} at {place.start}:{place.start + place.size}"
         if place.age:

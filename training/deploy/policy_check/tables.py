@@ -33,20 +33,16 @@ def print_policies(known: list[Known], console: Console) -> None:
     table = text_table("", headings, (), rows)
     table.columns[0].no_wrap = True
     console.print(table)
-    _print_places(known, console)
+    looked = dict.fromkeys(str(place) for each in known for place in places(each.origin))
+    console.print(f"looked for, by size and SHA-256, in the folders of {PLACES}, in checkouts of "
+                  "the projects here or beside the repository, and in ../shared/rivals: "
+                  f"{', '.join(looked) or 'none of them is there'}",
+                  markup=False, highlight=False)  # fmt: skip
     for each in missing:
         name, file = next(iter(each.origin.files.items()))
         path = f"{each.origin.folder}/{name}" if each.origin.folder else name
         console.print(f"{each.name}: {how_to_get(each.origin)}; {path}, SHA-256 {file.sha256}",
                       markup=False, highlight=False)  # fmt: skip
-
-
-def _print_places(known: list[Known], console: Console) -> None:
-    found = dict.fromkeys(str(place) for each in known for place in places(each.origin))
-    console.print(f"looked for, by size and SHA-256, in the folders of {PLACES}, in checkouts of "
-                  "the projects here or beside the repository, and in ../shared/rivals: "
-                  f"{', '.join(found) or 'none of them is there'}",
-                  markup=False, highlight=False)  # fmt: skip
 
 
 def print_check(check: PolicyCheck, console: Console) -> None:
@@ -55,7 +51,9 @@ def print_check(check: PolicyCheck, console: Console) -> None:
     def say(line: str) -> None:
         console.print(line, markup=False, highlight=False)
 
-    say(f"{check.file}: {_sides(check)}")
+    sides = [", ".join(f"{name} {size or '?'}" for name, size in side.items())
+             for side in (check.sizes.inputs, check.sizes.outputs)]  # fmt: skip
+    say(f"{check.file}: takes {sides[0]}; gives {sides[1]}")
     if check.known is not None:
         say(f"it is {check.known}, a known policy: that name plays it, too")
     if check.stood is None:
@@ -72,12 +70,6 @@ def print_check(check: PolicyCheck, console: Console) -> None:
     for finding in check.findings:
         say(f"  {VERDICTS[finding.right]}: {finding.what}: {finding.text}")
     say(_verdict(check))
-
-
-def _sides(check: PolicyCheck) -> str:
-    sides = [", ".join(f"{name} {size or '?'}" for name, size in side.items())
-             for side in (check.sizes.inputs, check.sizes.outputs)]  # fmt: skip
-    return f"takes {sides[0]}; gives {sides[1]}"
 
 
 def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:

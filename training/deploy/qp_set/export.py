@@ -8,7 +8,7 @@ import io
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal
 
 import numpy as np
 
@@ -28,54 +28,9 @@ from poise.training.running.provenance import commit, versions
 from .recordings import PUSH_DURATION, RecordedTick, Recovery, recoveries
 
 Form = Literal["reduced", "full"]
+Manifest = dict[str, Any]  # manifest.json; see `README` for what it says
 PER_TRIAL = 25  # problems
 LIBRARIES = ("mujoco", "numpy", "numba", "scipy")
-
-
-class PushRecord(TypedDict):
-    """The pushes of all trials: the body, its duration [s], and the limit of the impulses."""
-
-    body: str
-    duration: float
-    limit: str
-
-
-class TrialRecord(TypedDict):
-    """A push (impulse [N·s]; direction [°]), how it ended, the ticks met and those solved."""
-
-    trial: int
-    seed: int
-    impulse: float
-    direction: float
-    end: str
-    ticks: int
-    solved: int
-
-
-class ProblemRecord(TypedDict):
-    """A file, its trial, the time after the push began [s], and the rows active at the solution."""
-
-    file: str
-    trial: int
-    time: float
-    active: int
-
-
-class Manifest(TypedDict):
-    """manifest.json; see `README` for the folder."""
-
-    form: Form
-    count: int
-    seed: int
-    robot: str
-    robot_fingerprint: str
-    joints: list[str]
-    controller: Mapping[str, object]
-    push: PushRecord
-    commit: str | None
-    versions: dict[str, str]
-    trials: list[TrialRecord]
-    problems: list[ProblemRecord]
 
 
 def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, np.ndarray | None]:
@@ -178,7 +133,7 @@ def _write_problems(
             raise PoiseError(
                 f"{controller.robot.name}: its trials give no problems that are solved"
             )
-        record: TrialRecord = {
+        record = {
             "trial": number, "seed": trial.seed,
             "impulse": trial.push.impulse, "direction": trial.push.direction,
             "end": trial.end, "ticks": trial.met, "solved": len(trial.ticks),

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import yaml
 
-from poise.configs.errors import ConfigError
 from poise.configs.files import resolve, write_atomic
 from poise.configs.reading import exists
 from poise.configs.schema import build, to_dict
@@ -21,24 +20,15 @@ def load_and_write(name: str) -> tuple[Robot, Path | None]:
     """The robot of a name, and the file of its description that was written for it, if any.
 
     One is written to the current folder for a model alone, called as it, where there is no file
-    of that name; what is missing in it, such as torque limits, is then asked for by its name.
+    of that name, which may be somebody's work; what is missing in it, such as torque limits, is
+    then asked for by its name. It has what is not the default, and the model's whole path.
 
     Raises ConfigError as `load_robot` and `guess`.
     """
     model, path = Path(name), Path(f"{robot_name(Path(name))}.yaml")
     if model.suffix.lower() not in MODELS or exists(path):
         return load_robot(name), None
-    write_description(guess(resolve("robots", name)), model, path)
-    return load_robot(path), path
-
-
-def write_description(description: RobotDescription, model: Path, path: Path) -> None:
-    """Write a guessed description, what is not the default, with the model's whole path.
-
-    Raises ConfigError where there is such a file already: it may be somebody's work.
-    """
-    if exists(path):
-        raise ConfigError("is there already, and is not written over", source=path)
+    description = guess(resolve("robots", name))
     plain = to_dict(RobotDescription(**NOTHING))  # type: ignore[arg-type]
     fields = to_dict(description)
     kept = {name: value for name, value in fields.items() if value != plain.get(name)}
@@ -51,3 +41,4 @@ def write_description(description: RobotDescription, model: Path, path: Path) ->
     text = yaml.safe_dump(kept, sort_keys=False, default_flow_style=None, width=100,
                           allow_unicode=True)  # fmt: skip
     write_atomic(path, HEAD.format(path=model.name) + text)
+    return load_robot(path), path

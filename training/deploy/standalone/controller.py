@@ -99,9 +99,7 @@ class StandaloneController:
         env.state_source = StateSource(env.simulation)  # delays are now the robot's own
         self._agent, self._env = agent, env
         self.name, self.robot, self.fingerprint = agent.name, env.robot, agent.fingerprint
-        self.joint_names = env.robot.joint_names
-        model = env.robot.model
-        self.motor_names = tuple(model.actuator(i).name for i in range(model.nu))
+        self.joint_names, self.motor_names = env.robot.joint_names, env.robot.motor_names
         self._servos = _servos(env)
         steps = env.control_substeps if isinstance(env, ResidualBalanceEnv) else env.substeps
         #: calls of `torques` in a control tick: servos answer in every physics step

@@ -19,8 +19,7 @@ from poise.envs.sensing.motors import DAMPING, STIFFNESS, TARGET, TORQUE
 from poise.envs.sensing.realism import PARTS, Realism
 from poise.training.benchmarking.trials.agents import Agent
 
-from .measurement import Measurement
-from .readings import Readings
+from .readings import Measurement, Readings
 
 
 class MotorCommand(NamedTuple):
@@ -81,11 +80,8 @@ class MeasuredState(EstimatedState):
         if config.kind == "auto":
             config = replace(config, kind="odometry")
         state = cls(source.plant, source.plant.robot, config)
-        state.believing, state.estimate, state.sense = (
-            state.estimate,
-            Program.of(()),
-            Program.of(()),
-        )
+        state.believing = state.estimate
+        state.estimate, state.sense = Program.of(()), Program.of(())
         return state
 
     believing: Program  #: of the estimator

@@ -6,12 +6,11 @@ import threading
 from collections.abc import Sequence
 
 from rich.console import Console
-from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 
 from poise.configs.errors import ConfigError
-from poise.training.learning.policy_files import STATE, find_checkpoint, read_state
+from poise.training.learning.policy_files import LAST, STATE, find_checkpoint, read_state
 from poise.training.running.tables import text_table
-from poise.training.running.terminal import ProgressLines
+from poise.training.running.terminal import steps_bar
 
 from .records import SeedRun, SeedSummary, evaluations
 
@@ -26,15 +25,7 @@ class SeedProgress:
 
     def __init__(self, runs: Sequence[SeedRun], console: Console):
         self.runs = runs
-        self._bar = ProgressLines(
-            TextColumn("seed {task.fields[seed]}"),
-            BarColumn(),
-            TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),
-            TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
-            console=console,
-            disable=console.quiet,
-        )
+        self._bar = steps_bar("seed {task.fields[seed]}", console)
         self._tasks = [
             self._bar.add_task("", total=run.config.steps, seed=run.config.seed, rate="")
             for run in runs
@@ -61,7 +52,7 @@ class SeedProgress:
 
     def _show(self) -> None:
         for run, task in zip(self.runs, self._tasks, strict=True):
-            checkpoint = find_checkpoint(run.folder / "last")
+            checkpoint = find_checkpoint(run.folder / LAST)
             if checkpoint is None:
                 continue
             try:

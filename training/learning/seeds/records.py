@@ -73,11 +73,6 @@ def start_and_best(
     return (rows[0] if rows else None), best
 
 
-def seed_folder(out: Path, seed: int) -> Path:
-    """The folder of a seed's run."""
-    return out / f"seed-{seed}"
-
-
 def read_seeds(out: Path) -> list[SeedEntry]:
     """The runs of seeds.json; raises ConfigError naming the file."""
     path = out / SEEDS

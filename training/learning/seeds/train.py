@@ -19,8 +19,8 @@ from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.rates import seed_figures
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.curriculum import curriculum_levels
-from poise.training.learning.policy_files import CONFIG, STATE, find_checkpoint, read_state
-from poise.training.learning.train import LAST, check_folder, check_pushes, train
+from poise.training.learning.policy_files import CONFIG, LAST, STATE, find_checkpoint, read_state
+from poise.training.learning.train import check_folder, check_pushes, train
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.provenance import circumstances
@@ -34,7 +34,6 @@ from .records import (
     SeedSummary,
     evaluations,
     read_seeds,
-    seed_folder,
     start_and_best,
 )
 
@@ -78,8 +77,8 @@ def train_seeds(
     if workers is not None and workers < 1:
         raise ConfigError(f"must be at least 1, not {workers}", field="workers")
     given, seeds = seeds, _all_seeds(seeds, out, resume)
-    runs = [_run(replace(config, seed=seed, threads=1), seed_folder(out, seed)) for seed in seeds]
-    missing = [run for run in runs if not _finished(run)]
+    runs = [_run(replace(config, seed=seed, threads=1), out / f"seed-{seed}") for seed in seeds]
+    missing = [run for run in runs if not _entry(run)["finished"]]
     curriculum_levels(config)
     env = config.make_env()  # compiles all that the runs need, once
     check_pushes(config, env)
@@ -87,44 +86,38 @@ def train_seeds(
     keeps(out / SEEDS, f"what is trained is kept in {out}; go on with --resume")
     with FolderLock(out):
         _all_seeds(given, out, resume)  # another process may have begun since
-        return _train(config, runs, missing, out, Executor(backend, workers), console, started)
-
-
-def _train(
-    config: TrainConfig,
-    runs: Sequence[SeedRun],
-    missing: Sequence[SeedRun],
-    out: Path,
-    executor: Executor,
-    console: Console,
-    started: float,
-) -> SeedSummary:
-    """Train what is missing; writes seeds.json at the start, and whole at the end."""
-    seeds = [run.config.seed for run in runs]
-    write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
-    write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
-    failed: list[str] = []
-    with SeedProgress(runs, console), executor:
-        for run, error in executor.each(train_run, missing):
-            if error is None and not _finished(run):
-                error = f"{run.folder} is not finished here: do all machines see it?"
-            if error is None:
-                console.print(_line(_entry(run)), markup=False, highlight=False)
-            else:
-                failed.append(f"seed {run.config.seed}: {error}")
-    if failed:
-        raise PoiseError(f"{'; '.join(failed)}; what is finished is kept, and --resume goes on")
-    entries = [_entry(run) for run in runs]
-    rates = [[evaluations(entry)[1]["recovered"]] for entry in entries]
-    recovered = seed_figures(np.array(rates), seeds)
-    summary: SeedSummary = {
-        "runs": entries,
-        "recovered": recovered,
-        **circumstances(started, executor.workers, executor.backend),
-    }
-    write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
-    print_seeds(summary, console)
-    return summary
+        executor = Executor(backend, workers)
+        write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
+        write_atomic(
+            out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n"
+        )
+        failed: list[str] = []
+        with SeedProgress(runs, console), executor:
+            for run, error in executor.each(train_run, missing):
+                if error is None and not _entry(run)["finished"]:
+                    error = f"{run.folder} is not finished here: do all machines see it?"
+                if error is None:
+                    start, best = evaluations(_entry(run))
+                    console.print(
+                        f"seed {run.config.seed}: recovered {best['recovered']:.1%} at its best, "
+                        f"{start['recovered']:.1%} at the start",
+                        markup=False,
+                        highlight=False,
+                    )
+                else:
+                    failed.append(f"seed {run.config.seed}: {error}")
+        if failed:
+            raise PoiseError(f"{'; '.join(failed)}; what is finished is kept, and --resume goes on")
+        entries = [_entry(run) for run in runs]
+        rates = [[evaluations(entry)[1]["recovered"]] for entry in entries]
+        summary: SeedSummary = {
+            "runs": entries,
+            "recovered": seed_figures(np.array(rates), seeds),
+            **circumstances(started, executor.workers, executor.backend),
+        }
+        write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
+        print_seeds(summary, console)
+        return summary
 
 
 def train_run(run: SeedRun) -> str | None:
@@ -172,10 +165,6 @@ def _run(config: TrainConfig, folder: Path) -> SeedRun:
     return SeedRun(config, folder, resume)
 
 
-def _finished(run: SeedRun) -> bool:
-    return _entry(run)["timesteps"] >= run.config.steps
-
-
 def _entry(run: SeedRun) -> SeedEntry:
     """The evaluations of a run at its start and at its best, for seeds.json."""
     checkpoint = find_checkpoint(run.folder / LAST)
@@ -189,11 +178,3 @@ def _entry(run: SeedRun) -> SeedEntry:
         "start": start,
         "best": best,
     }
-
-
-def _line(entry: SeedEntry) -> str:
-    start, best = evaluations(entry)
-    return (
-        f"seed {entry['seed']}: recovered {best['recovered']:.1%} at its best, "
-        f"{start['recovered']:.1%} at the start"
-    )

@@ -1,6 +1,6 @@
 """A candidate of `poise tune` is judged here, by how pushes and walks around the limit end."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -50,20 +50,20 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
         "duration": candidate.seconds, "pushes": None,
         "realism": load_realism(candidate.realism),
     }  # fmt: skip
+
+    def worths(agent: Agent, trials: Iterable[Trial]) -> list[float]:
+        return [worth(agent, each, candidate.in_place, candidate.chatter) for each in trials]
+
     alone, below = [], []
     if candidate.alone:
         env = ResidualBalanceEnv(robot, **settings)
         action = np.zeros(len(env.action_names))
         agent = Agent("alone", env, lambda observation: action, "")
-        alone = [
-            worth(agent, trial, candidate.in_place, candidate.chatter) for trial in candidate.alone
-        ]
+        alone = worths(agent, candidate.alone)
     if candidate.policy is not None and candidate.below:
         policy = _policy(candidate.policy, candidate.robot)
         agent = Agent("policy", policy.make_env(robot=robot, **settings), policy.act, "")
-        below = [
-            worth(agent, trial, candidate.in_place, candidate.chatter) for trial in candidate.below
-        ]
+        below = worths(agent, candidate.below)
     return alone, below
 
 

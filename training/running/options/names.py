@@ -87,14 +87,3 @@ def first_comment(path: Path) -> str:
         r" \((docs|see|`poise)[^)]*\)| by `poise tune.*|: `poise [^`]*`", "", " ".join(lines)
     )
     return re.split(r"(?<=[a-z)\]%0-9])\.(?: |$)", text)[0].strip()
-
-
-def columns(entries: list[Named]) -> list[str]:
-    """The keys that some of the entries have, in their order."""
-    return [key for key in Named.__annotations__ if any(key in entry for entry in entries)]
-
-
-def cell(entry: Named, key: str) -> str:
-    """The text of an entry in a table."""
-    value: Any = entry.get(key, "")
-    return f"{value:.1f}" if isinstance(value, float) else str(value)

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .described import Option
-from .names import KINDS, Named, cell, columns
+from .names import KINDS, Named
 
 HEADINGS = {"j50": "J50 [N·s]", "action": "moves", "on": "on top of", "about": ""}
 INDENT = 6  # of a sentence below its option
@@ -50,11 +50,13 @@ def print_names(kinds: Mapping[str, list[Named]], console: Console) -> None:
     """Print a table of each kind of names."""
     for kind, entries in kinds.items():
         console.print(Text(f"\n{kind} ({KINDS[kind]})", style="bold"))
-        table, keys = Table.grid(padding=(0, 2)), columns(entries)
+        table = Table.grid(padding=(0, 2))
+        keys = [key for key in Named.__annotations__ if any(key in entry for entry in entries)]
         if len(keys) > 2:
             table.add_row(*(Text(HEADINGS.get(key, key), style="dim") for key in keys))
         for entry in entries:
-            table.add_row(*(Text(cell(entry, key)) for key in keys))
+            cells = (entry.get(key, "") for key in keys)
+            table.add_row(*(Text(f"{x:.1f}" if isinstance(x, float) else str(x)) for x in cells))
         console.print(table)
 
 

@@ -16,8 +16,7 @@ from poise.envs.sensing.measurement import RING
 from poise.envs.sensing.motors import STIFFNESS
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, load_agent
-from poise.training.deploy.standalone.measurement import Measurement
-from poise.training.deploy.standalone.readings import Readings
+from poise.training.deploy.standalone.readings import Measurement, Readings
 from poise.training.deploy.standalone.sensed import MotorCommand, SensedController, typical
 from tests.support.shared import robot
 

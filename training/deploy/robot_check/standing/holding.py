@@ -45,10 +45,11 @@ def holding(robot: Robot, qpos: np.ndarray, soles: Sequence[int]) -> Holding:
     limit = np.zeros(model.nv)
     limit[robot.motor_dofs] = robot.torque_limit
     loss = np.where(limit > 0.0, 0.0, model.dof_frictionloss)
+    rounding = 1e-6 * robot.units.moment  # that the solver may leave in a row [N, N·m]
     found = linprog(
         c=[*np.zeros(lift.shape[1]), 1.0],
         A_ub=np.vstack([np.column_stack([sign * lift, -limit]) for sign in (1.0, -1.0)]),
-        b_ub=np.concatenate([sign * needed + loss + _rounding(robot) for sign in (1.0, -1.0)]),
+        b_ub=np.concatenate([sign * needed + loss + rounding for sign in (1.0, -1.0)]),
     )
     if not found.success:
         return Holding(None, None)
@@ -71,8 +72,3 @@ def _corner_jacobians(robot: Robot, data: mujoco.MjData, sole: int) -> np.ndarra
         mujoco.mj_jac(model, data, jacobian, None, point, foot.body_id)
         rows.append(np.array(edges) @ jacobian)
     return np.vstack(rows)
-
-
-def _rounding(robot: Robot) -> float:
-    """The error of a row that the solver of the linear program may leave [N, N·m]."""
-    return 1e-6 * robot.units.moment
