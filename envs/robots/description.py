@@ -20,9 +20,8 @@ class SourceDescription:
     urdf: str | None = None
     #: of the SRDF file beside it, in the same form, for the links that do not collide
     srdf: str | None = None
-    menagerie: str | None = (
-        None  #: folder and file of a model of MuJoCo Menagerie, see `find_model`
-    )
+    #: folder and file of a model of MuJoCo Menagerie, see `find_model`
+    menagerie: str | None = None
     licence: str = ""  #: of the model's files, for whoever reads the description
 
     def __post_init__(self) -> None:
