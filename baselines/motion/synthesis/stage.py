@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.groups import GROUPS
+from poise.baselines.motion.clips.skeleton import GROUPS
 from poise.baselines.motion.graphs.adjacency import Frames, end_to_begin, frames_of, with_clip
 from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
 from poise.baselines.motion.graphs.motion_graph import GraphClip, MotionGraph, Transition
