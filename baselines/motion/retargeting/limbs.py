@@ -31,6 +31,13 @@ class Point(NamedTuple):
         return total / len(self.parts)
 
 
+def sole_corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:
+    """(k, 3) corners of a sole in the world [m]."""
+    sole = robot.soles[foot]
+    corners = np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position
+    return data.xpos[sole.body_id] + corners @ data.xmat[sole.body_id].reshape(3, 3).T
+
+
 class Limbs(NamedTuple):
     """Points of a robot by role, such as ``elbow_left``; those of arms only if it has arms."""
 
