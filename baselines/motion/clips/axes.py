@@ -45,7 +45,7 @@ class FileAxes:
     @property
     def names(self) -> tuple[str, str]:
         """(up, forward), such as ("y", "z")."""
-        return _name(self.matrix[2]), _name(self.matrix[0])
+        return nearest_axis(self.matrix[2]), nearest_axis(self.matrix[0])
 
 
 def axes_of(up: str, forward: str, unit: float = 1.0, source: str | None = None) -> FileAxes:
@@ -63,10 +63,8 @@ def axes_of(up: str, forward: str, unit: float = 1.0, source: str | None = None)
 
 def nearest_axis(vector: np.ndarray) -> str:
     """The signed axis that a vector (3,) is nearest to."""
-    unit = np.zeros(3)
-    largest = int(np.argmax(np.abs(vector)))
-    unit[largest] = np.sign(vector[largest])
-    return _name(unit)
+    axis = int(np.argmax(np.abs(vector)))
+    return ("-" if vector[axis] < 0 else "") + "xyz"[axis]
 
 
 def unit_from_legs(length: float) -> float:
@@ -102,8 +100,3 @@ def _vector(name: str, field: str, source: str | None) -> np.ndarray:
     vector = np.zeros(3)
     vector["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
     return vector
-
-
-def _name(row: np.ndarray) -> str:
-    axis = int(np.argmax(np.abs(row)))
-    return ("-" if row[axis] < 0 else "") + "xyz"[axis]

@@ -19,7 +19,7 @@ from .bvh_text import read_bvh_text
 from .clip import Clip
 from .roles import ROLES, SIDES, find_roles, structural_roles
 from .rotations import to_scipy
-from .skeleton import Skeleton, leg_length
+from .skeleton import Skeleton
 
 ALONE = 4.0  # times the largest move between frames: that of a first frame that is the rest pose
 Y_UP = axes_of("y", "z")  # what most programs write
@@ -110,7 +110,7 @@ def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
     """
     if Path(path).suffix.lower() != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=path, choices=("*.bvh",))
-    clip = depth_first(clip)
+    clip, up = depth_first(clip), axes.names[0]
     with needing("motion", "motion"):
         from pybvh import Bvh
     from_clip = Bvh(
@@ -118,7 +118,7 @@ def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
         root_pos=axes.file_places(clip.root),
         joint_angles=_angles(axes.file_turns(clip.rotations), clip.skeleton.orders),
         frame_time=clip.dt,
-        world_up=_signed(axes.names[0]),
+        world_up=up if up.startswith("-") else f"+{up}",
     )
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "clip.bvh"
@@ -174,7 +174,12 @@ def _axes(
                 f"name it, {missing[0]}=JOINT (--joints), or unit, up and forward",
                 source=source, field="joints", choices=raw.names,
             )  # fmt: skip
-    length = named_unit(unit, source) if unit != "auto" else _unit(raw, roles, source)
+    if unit != "auto":
+        length = named_unit(unit, source)
+    elif raw.leg_length < 1e-9:
+        raise ConfigError("its legs have no length: name the unit", source=source, field="unit")
+    else:
+        length = unit_from_legs(raw.leg_length)
     pose = raw.global_pose(places[::10], turns[::10])[0].mean(axis=0)
     if up == "auto":
         up = nearest_axis(_middle(pose, roles, "hip") - _middle(pose, roles, "ankle"))
@@ -185,19 +190,8 @@ def _axes(
     return axes_of(up, forward, length, source)
 
 
-def _unit(raw: Skeleton, roles: dict[str, int], source: str) -> float:
-    length = leg_length(raw.offsets, raw.parents, roles)
-    if length < 1e-9:
-        raise ConfigError("its legs have no length: name the unit", source=source, field="unit")
-    return unit_from_legs(length)
-
-
 def _middle(pose: np.ndarray, roles: dict[str, int], joint: str) -> np.ndarray:
     return 0.5 * (pose[roles[f"{joint}_left"]] + pose[roles[f"{joint}_right"]])
-
-
-def _signed(axis: str) -> str:
-    return axis if axis.startswith("-") else f"+{axis}"
 
 
 def _nodes(skeleton: Skeleton, axes: FileAxes) -> list[object]:

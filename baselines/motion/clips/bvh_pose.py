@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from poise.configs.errors import ConfigError, shown
 
 from .bvh_text import BvhText
+from .roles import way_up
 from .rotations import angle_between, from_scipy, inverse, multiply, rotate
 from .skeleton import Skeleton
 
@@ -78,18 +79,22 @@ def rooted_at_hips(posed: Posed, roles: dict[str, int]) -> Posed:
     above moves the new root. Where they only turn the skeleton, its rest pose is turned, too.
     """
     old = posed.skeleton
-    top = _common(old.parents, list(roles.values())) if roles else _first_branch(old.parents)
+    ways = [way_up(old.parents, joint) for joint in roles.values()]
+    shared = [joint for joint in ways[0] if all(joint in way for way in ways)] if ways else []
+    top = shared[0] if shared else _first_branch(old.parents)
     if top == 0:
         return _kept(posed, np.arange(len(old.names)), posed.root, posed.turns, old.offsets, roles)
-    places, turns = _pose(posed)
+    places, turns = old.global_pose(posed.root, posed.turns, posed.shifts)
     above = turns[:, int(old.parents[top])]
     still = float(angle_between(above, above[:1]).max()) < STILL
     rest = above[0] if still else np.array([1.0, 0.0, 0.0, 0.0])
     local = multiply(multiply(rest, posed.turns), inverse(rest))
     local[:, top] = multiply(turns[:, top], inverse(rest))
-    kept = np.array([joint for joint in range(len(old.parents)) if top in _way(old.parents, joint)])
+    kept = [joint for joint in range(len(old.parents)) if top in way_up(old.parents, joint)]
     moved = replace(posed, shifts=rotate(rest, posed.shifts))
-    return _kept(moved, kept, places[:, top], local, rotate(rest, old.offsets), roles, rest)
+    return _kept(
+        moved, np.array(kept), places[:, top], local, rotate(rest, old.offsets), roles, rest
+    )
 
 
 def _kept(
@@ -128,31 +133,6 @@ def rigid(posed: Posed, source: str) -> Posed:
             field="joints",
         )
     return posed
-
-
-def _pose(posed: Posed) -> tuple[np.ndarray, np.ndarray]:
-    """Places and orientations of all joints, with positions that change."""
-    places, turns = posed.shifts.copy(), posed.turns.copy()
-    places[:, 0] = posed.root
-    for i, parent in enumerate(posed.skeleton.parents[1:], start=1):
-        turns[:, i] = multiply(turns[:, parent], posed.turns[:, i])
-        places[:, i] = places[:, parent] + rotate(turns[:, parent], posed.shifts[:, i])
-    return places, turns
-
-
-def _common(parents: np.ndarray, joints: list[int]) -> int:
-    """The joint on which all of some joints hang."""
-    ways = [_way(parents, joint) for joint in joints]
-    shared = [joint for joint in ways[0] if all(joint in way for way in ways[1:])]
-    return shared[0]
-
-
-def _way(parents: np.ndarray, joint: int) -> list[int]:
-    """A joint, its parent, and so on to the root."""
-    way = [joint]
-    while (joint := int(parents[joint])) >= 0:
-        way.append(joint)
-    return way
 
 
 def _first_branch(parents: np.ndarray) -> int:

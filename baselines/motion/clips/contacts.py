@@ -107,11 +107,9 @@ def _velocities(points: np.ndarray, dt: float) -> np.ndarray:
 
 
 def _foot_points(clip: Clip) -> np.ndarray:
-    """(2, 2) toe and ankle, left and right."""
-    return np.array([[_toe(clip, side), clip.skeleton.joint(f"ankle_{side}", clip.name)]
-                     for side in SIDES])  # fmt: skip
-
-
-def _toe(clip: Clip, side: str) -> int:
-    toe = f"toe_{side}"
-    return clip.skeleton.joint(toe if toe in clip.skeleton.roles else f"ankle_{side}", clip.name)
+    """(2, 2) toe and ankle, left and right; without a toe the ankle twice."""
+    known, joint = clip.skeleton.roles, clip.skeleton.joint
+    ankles = [f"ankle_{side}" for side in SIDES]
+    toes = [toe if (toe := f"toe_{side}") in known else f"ankle_{side}" for side in SIDES]
+    return np.array([[joint(role, clip.name) for role in pair]
+                     for pair in zip(toes, ankles, strict=True)])  # fmt: skip

@@ -39,6 +39,14 @@ _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|左|右|[^\W\d_a-zA-Z左�
 _WHOLE = frozenset(word for words in SIDED.values() for word in words)
 
 
+def way_up(parents: np.ndarray, joint: int) -> list[int]:
+    """A joint, its parent, and so on to the root."""
+    way = [joint]
+    while (joint := int(parents[joint])) >= 0:
+        way.append(joint)
+    return way
+
+
 def find_roles(names: Sequence[str]) -> dict[str, int]:
     """Role → index among `names`; of several names for a role the most certain one wins.
 
@@ -136,11 +144,10 @@ def structural_roles(
         places: (F, J, 3) of the joints in some frames.
         ends: (F, E, 3) of the end sites.
     """
-    limbs = sorted(_limbs(parents, offsets), key=lambda pair: _depth(parents, pair[0][0]))
-    legs = next(iter(limbs), None)
-    if legs is None:
+    limbs = sorted(_limbs(parents, offsets), key=lambda pair: len(way_up(parents, pair[0][0])))
+    if not limbs:
         return {}
-    found = [_bones(chain, offsets, len(LEG)) for chain in legs]
+    found = [_bones(chain, offsets, len(LEG)) for chain in limbs[0]]
     ahead = [_ahead(bones, places, end_parents, ends) for bones in found]
     hips, ankles = places[:, [b[0] for b in found]], places[:, [b[2] for b in found]]
     up = (hips - ankles).mean(axis=1)
@@ -216,10 +223,3 @@ def _ahead(
     if len(tips) == 0:
         return np.zeros_like(places[:, 0])
     return ends[:, tips].mean(axis=1) - places[:, bones[2]]
-
-
-def _depth(parents: np.ndarray, joint: int) -> int:
-    depth = 0
-    while (joint := int(parents[joint])) >= 0:
-        depth += 1
-    return depth

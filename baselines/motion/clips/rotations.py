@@ -48,12 +48,19 @@ def about_z(angle: float) -> np.ndarray:
     return np.array([np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)])
 
 
+def log(quaternions: np.ndarray) -> np.ndarray:
+    """Rotation vectors (…, 3) [rad] of unit quaternions (…, 4), on the shorter way."""
+    return to_scipy(quaternions).as_rotvec().reshape(*quaternions.shape[:-1], 3)
+
+
+def exp(vectors: np.ndarray) -> np.ndarray:
+    """Unit quaternions (…, 4) of rotation vectors (…, 3) [rad]."""
+    return from_scipy(Rotation.from_rotvec(vectors.reshape(-1, 3)), vectors.shape[:-1])
+
+
 def slerp(a: np.ndarray, b: np.ndarray, u: np.ndarray | float) -> np.ndarray:
     """Rotations (…, 4) at fractions `u` of the ways from `a` to `b`: a exp(u log(a⁻¹ b))."""
-    gap = multiply(inverse(a), b)
-    way = to_scipy(gap).as_rotvec().reshape(gap.shape[:-1] + (3,)) * np.asarray(u)[..., None]
-    step = from_scipy(Rotation.from_rotvec(way.reshape(-1, 3)), way.shape[:-1])
-    return multiply(a, step)
+    return multiply(a, exp(log(multiply(inverse(a), b)) * np.asarray(u)[..., None]))
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:

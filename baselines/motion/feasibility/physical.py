@@ -16,7 +16,7 @@ from poise.envs.robots.robot import Robot
 from .apart import Stretch, check_rates, in_one, stretch_at
 from .check import Feasibility, FeasibilityLimits
 from .curve import Curve
-from .ends import Attempt, End
+from .edges import Attempt, End
 from .shape import Shaper
 from .trajectory import PlantedRobot
 

@@ -12,8 +12,7 @@ from poise.envs.compiled.maths.polygons import half_planes
 
 from .check import Feasibility, FeasibilityLimits, check_joints, judge
 from .curve import Boundary, Curve, bend_shapes, jerk_matrix
-from .edges import EDGE, between_clips
-from .ends import Attempt, End
+from .edges import EDGE, Attempt, End, between_clips
 from .split import bearable_region
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 

@@ -12,40 +12,31 @@ from .trajectory import PlantedRobot, Trajectory, record
 SMALL = 1e-3  # [s] of the differences that velocities and accelerations are
 
 
-class SteppedPostures:
-    """Postures of a motion with a footing, in its own frame: its root is where its CoM is."""
-
-    def __init__(self, motion: ReferenceMotion, robot: Robot, ground: float):
-        self.motion, self.robot, self._ground = motion, robot, ground
-        self._data, self._standing = mujoco.MjData(robot.model), robot.standing_qpos
-
-    def at(self, time: float) -> np.ndarray:
-        """(nq,) the posture at a time [s]."""
-        footing, data = self.motion.footing, self._data
-        assert footing is not None
-        sample, turn = footing.sample(time), np.empty(4)
-        angle = float(np.linalg.norm(sample.root[0]))
-        mujoco.mju_axisAngle2Quat(turn, sample.root[0] / max(angle, 1e-12), angle)
-        mujoco.mju_mulQuat(data.qpos[3:7], turn, self._standing[3:7])
-        data.qpos[7:] = self.motion.sample(time).q_ref
-        data.qpos[:3] = 0.0
-        mujoco.mj_kinematics(self.robot.model, data)
-        mujoco.mj_comPos(self.robot.model, data)
-        com = sample.com[0] + [0.0, 0.0, self._ground]
-        data.qpos[:3] = com - data.subtree_com[self.robot.root_body_id]
-        return np.array(data.qpos)
-
-
 def sample_stepped(planted: PlantedRobot, motion: ReferenceMotion, times: np.ndarray) -> Trajectory:
-    """The whole robot at `times` (n,) [s]; velocities and accelerations are central differences."""
+    """The whole robot at `times` (n,) [s], in the motion's own frame: its root is where its CoM is.
+
+    Velocities and accelerations are central differences.
+    """
     robot, footing = planted.robot, motion.footing
     assert footing is not None
-    postures = SteppedPostures(motion, robot, planted.ground)
-    model, nv = robot.model, robot.model.nv
-    ahead, back = np.empty(nv), np.empty(nv)
+    model, nv, data = robot.model, robot.model.nv, mujoco.MjData(robot.model)
+    ahead, back, turn = np.empty(nv), np.empty(nv), np.empty(4)
+
+    def posture(time: float) -> np.ndarray:
+        sample = footing.sample(time)
+        angle = float(np.linalg.norm(sample.root[0]))
+        mujoco.mju_axisAngle2Quat(turn, sample.root[0] / max(angle, 1e-12), angle)
+        mujoco.mju_mulQuat(data.qpos[3:7], turn, robot.standing_qpos[3:7])
+        data.qpos[7:] = motion.sample(time).q_ref
+        data.qpos[:3] = 0.0
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        com = sample.com[0] + [0.0, 0.0, planted.ground]
+        data.qpos[:3] = com - data.subtree_com[robot.root_body_id]
+        return np.array(data.qpos)
 
     def put(time: float) -> np.ndarray:
-        before, now, after = (postures.at(time + step) for step in (-SMALL, 0.0, SMALL))
+        before, now, after = (posture(time + step) for step in (-SMALL, 0.0, SMALL))
         mujoco.mj_differentiatePos(model, back, SMALL, before, now)
         mujoco.mj_differentiatePos(model, ahead, SMALL, now, after)
         planted.put(now, 0.5 * (ahead + back))

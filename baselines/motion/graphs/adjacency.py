@@ -9,9 +9,9 @@ from scipy.ndimage import minimum_filter
 
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts
-from poise.baselines.motion.clips.rotations import about_z, inverse, multiply
+from poise.baselines.motion.clips.rotations import about_z, inverse, log, multiply
 from poise.baselines.motion.graphs.joining.coefficient import best_duration, moved_shares
-from poise.baselines.motion.graphs.joining.states import log, minus
+from poise.baselines.motion.graphs.joining.states import minus
 from poise.configs.errors import ConfigError
 
 from .motion_graph import (
@@ -23,6 +23,7 @@ from .motion_graph import (
     Weight,
     earliest_part,
     latest_part,
+    place_in_order,
 )
 
 SAMPLING = 1.0 / 15.0  # [s] between frames that are compared
@@ -198,7 +199,7 @@ def with_clip(graph: MotionGraph, entry: GraphClip, frames: dict[str, Frames]) -
             found, reason = transitions_between(frames[a], frames[b], graph.thresholds)
             transitions += found
             refused += [] if found else [(a, b, reason)]
-    transitions.sort(key=lambda t: (t.before, t.after, t.leave, t.enter))
+    transitions.sort(key=place_in_order)
     return replace(graph, clips=(*graph.clips, entry), transitions=tuple(transitions),
                    refused=tuple(refused))  # fmt: skip
 

@@ -66,13 +66,10 @@ class Layers:
                            f"{', '.join(reached[:20]) or 'nothing'}{said})")  # fmt: skip
 
     def _path(self, nodes: list[int], cost: float) -> Path:
-        """The path of all nodes from the begin to the end."""
-        return Path(self._steps(nodes[1:-1]), cost - OFFSET)
-
-    def _steps(self, nodes: list[int]) -> tuple[Step, ...]:
-        """Nodes between which a clip is played on are one step."""
-        groups, after = [[nodes[0]]], []
-        for last, node in pairwise(nodes):
+        """The path of all nodes from the begin to the end: those between which a clip is played on
+        are one step."""
+        groups, after = [[nodes[1]]], []
+        for last, node in pairwise(nodes[1:-1]):
             transition = self._transition(last, node)
             if transition is None:
                 groups[-1].append(node)
@@ -81,10 +78,11 @@ class Layers:
                 after.append(transition)
         ends = [(self.moments.place(g[0] % self.size), self.moments.place(g[-1] % self.size))
                 for g in groups]  # fmt: skip
-        return tuple(
+        steps = tuple(
             Step(name, enter, leave, bool(g[0] // self.size % 2), t)
             for ((name, enter), (_, leave)), g, t in zip(ends, groups, [*after, None], strict=True)
         )
+        return Path(steps, cost - OFFSET)
 
     def _transition(self, last: int, node: int) -> Transition | None:
         """The transition of an edge, or None for playing on."""

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from .motion_graph import MotionGraph, Transition
 from .paths import Place
@@ -98,3 +100,21 @@ class Moments:
         number = self.joined(before, after)
         assert number is not None  # the edge was taken
         return self.transitions[number]
+
+
+def strong_clips(graph: MotionGraph) -> list[str]:
+    """The clips of which some part lies where one can go on for ever.
+
+    That is the largest strongly connected component of all moments, in which playing on leads from
+    a moment of a clip to the next one; none if no moment is reached again.
+    """
+    moments = Moments(graph)
+    pairs = np.concatenate([moments.plays, moments.joins])
+    size = len(moments)
+    matrix = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    _, labels = connected_components(matrix, connection="strong")
+    counts = np.bincount(labels)
+    if counts.max() < 2:
+        return []
+    inside = set(moments.clip[labels == np.argmax(counts)].tolist())
+    return [name for i, name in enumerate(graph.names) if i in inside]

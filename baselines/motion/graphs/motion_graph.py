@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,10 @@ class Transition:
     enter: float
     duration: float
     coefficient: float
+
+
+#: sorts transitions by clips, then by times
+place_in_order = attrgetter("before", "after", "leave", "enter")
 
 
 @dataclass(frozen=True)

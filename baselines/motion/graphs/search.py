@@ -5,7 +5,7 @@ from collections.abc import Callable
 from poise.configs.errors import ConfigError, shown
 
 from .layers import Layers
-from .motion_graph import MotionGraph, Transition
+from .motion_graph import MotionGraph, Transition, place_in_order
 from .paths import Path, Task
 
 CHECKS = 200  # of the best path, before the search gives up
@@ -42,7 +42,7 @@ def best_paths(
         if not paths:
             raise layers.no_way(known)
         used = {s.after for path in paths for s in path.steps if s.after is not None}
-        new = sorted(used - set(known) - set(task.arrows.values()), key=_order)
+        new = sorted(used - set(known) - set(task.arrows.values()), key=place_in_order)
         if check is None or not new:
             return paths
         known |= {transition: check(transition) for transition in new}
@@ -61,7 +61,3 @@ def _check(graph: MotionGraph, task: Task, k: int) -> None:
         if name not in graph.names:
             raise ConfigError(f"no clip is called {shown(name)}", field="actions",
                               choices=graph.names)  # fmt: skip
-
-
-def _order(transition: Transition) -> tuple[str, str, float, float]:
-    return transition.before, transition.after, transition.leave, transition.enter

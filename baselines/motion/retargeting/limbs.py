@@ -31,10 +31,18 @@ class Point(NamedTuple):
         return total / len(self.parts)
 
 
+def sole_corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:
+    """(k, 3) corners of a sole in the world [m]."""
+    sole = robot.soles[foot]
+    corners = np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position
+    return data.xpos[sole.body_id] + corners @ data.xmat[sole.body_id].reshape(3, 3).T
+
+
 class Limbs(NamedTuple):
     """Points of a robot by role, such as ``elbow_left``; those of arms only if it has arms."""
 
     points: dict[str, Point]
+    standing: dict[str, np.ndarray]  # (3,) where they are in the standing posture [m]
     leg_length: float  # [m] thigh and shank, mean of both legs
 
     @property
@@ -58,15 +66,21 @@ def find_limbs(robot: Robot) -> Limbs:
     chains = [_joints(model, sole.body_id) for sole in feet]
     points: dict[str, Point] = {}
     for side, own, other in zip(("left", "right"), chains, chains[::-1], strict=True):
-        hip, knee, ankle = _three(data, [j for j in own if j not in other])
-        points |= {f"{role}_{side}": _anchor(model, joint)
-                   for role, joint in (("hip", hip), ("knee", knee), ("ankle", ankle))}  # fmt: skip
-    lengths = [_length(points, data, side) for side in ("left", "right")]
+        leg = [joint for joint in own if joint not in other]
+        knee = _middle(data, leg, *data.xanchor[[leg[0], leg[-1]]])
+        joints = (("hip", leg[0]), ("knee", knee), ("ankle", leg[-1]))
+        points |= {f"{role}_{side}": _anchor(model, joint) for role, joint in joints}
     points |= _arms(model, data, robot, {joint for chain in chains for joint in chain})
     points["pelvis"] = Point((*points["hip_left"].parts, *points["hip_right"].parts))
     points["feet"] = Point((*points["ankle_left"].parts, *points["ankle_right"].parts))
     points |= _trunk(robot, data, points)
-    return Limbs(points, float(np.mean(lengths)))
+    at = {role: point.place(data) for role, point in points.items()}
+    lengths = [
+        np.linalg.norm(at[f"knee_{side}"] - at[f"hip_{side}"])
+        + np.linalg.norm(at[f"ankle_{side}"] - at[f"knee_{side}"])
+        for side in ("left", "right")
+    ]
+    return Limbs(points, at, float(np.mean(lengths)))
 
 
 def _joints(model: mujoco.MjModel, body: int) -> list[int]:
@@ -83,21 +97,11 @@ def _anchor(model: mujoco.MjModel, joint: int) -> Point:
     return Point(((int(model.jnt_bodyid[joint]), model.jnt_pos[joint].copy()),))
 
 
-def _three(data: mujoco.MjData, joints: list[int]) -> tuple[int, int, int]:
-    """First and last of a chain's joints, and the one whose nearer end is furthest."""
-    first, last = joints[0], joints[-1]
-    return first, _middle(data, joints, data.xanchor[first], data.xanchor[last]), last
-
-
 def _middle(data: mujoco.MjData, joints: list[int], a: np.ndarray, b: np.ndarray) -> int:
+    """Of a chain's joints the one whose nearer end is furthest; the ends (3,) are at a and b."""
     anchors = data.xanchor[joints]
     ends = [np.linalg.norm(anchors - end, axis=1) for end in (a, b)]
     return joints[int(np.argmax(np.minimum(*ends)))]
-
-
-def _length(points: dict[str, Point], data: mujoco.MjData, side: str) -> float:
-    hip, knee, ankle = (points[f"{role}_{side}"].place(data) for role in ("hip", "knee", "ankle"))
-    return float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
 
 
 def _arms(

@@ -205,8 +205,7 @@ def frames_before(paces: list[Pace], lead: int) -> int:
 def hump(u: np.ndarray) -> np.ndarray:
     """From 0 to 1 at u = 0.45 and back, C² and at rest at both ends."""
     up, down = np.clip(u / 0.45, 0.0, 1.0), np.clip((1.0 - u) / 0.55, 0.0, 1.0)
-    v = np.minimum(up, down)
-    return ease(v)
+    return ease(np.minimum(up, down))
 
 
 def _heights(frames: int, times: list[tuple[int, ...]], h: float, low: float) -> np.ndarray:
@@ -214,5 +213,4 @@ def _heights(frames: int, times: list[tuple[int, ...]], h: float, low: float) ->
     k = np.arange(frames) * RATE
     down = np.clip((k - times[0][0] * RATE + 0.7) / 0.7, 0.0, 1.0)
     up = np.clip((times[-1][1] * RATE + 0.7 - k) / 0.7, 0.0, 1.0)
-    v = np.minimum(down, up)
-    return np.asarray(h * (1.0 - (1.0 - low) * ease(v)))
+    return np.asarray(h * (1.0 - (1.0 - low) * ease(np.minimum(down, up))))

@@ -147,7 +147,7 @@ def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted:
     steps = not planted and not measure_contacts(clip).in_place
     limbs = find_limbs(robot)
     targets = clip_targets(clip, limbs.has_arms, smooth, first_heading(clip) if steps else None)
-    whole = between_standing(targets, standing_targets(robot, limbs), lead)
+    whole = between_standing(targets, standing_targets(limbs), lead)
     return AskedOf(limbs, whole, steps)
 
 

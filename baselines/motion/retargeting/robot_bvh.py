@@ -6,10 +6,9 @@ So any anchors and axes are exact, and the angle is read off again without a sea
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.rotations import from_scipy, inverse, multiply, to_scipy
+from poise.baselines.motion.clips.rotations import angle_between, exp
 from poise.baselines.motion.clips.skeleton import ROLES, Skeleton
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
@@ -50,9 +49,7 @@ def robot_skeleton(robot: Robot) -> Skeleton:
 
 def clip_of_robot(robot: Robot, qpos: np.ndarray, dt: float, name: str) -> Clip:
     """Postures (F, nq) as a clip of `robot_skeleton`."""
-    axes, angles = _axes(robot), qpos[:, 7:]
-    vectors = angles[..., None] * axes
-    turns = from_scipy(Rotation.from_rotvec(vectors.reshape(-1, 3)), angles.shape)
+    turns = exp(qpos[:, 7:, None] * _axes(robot))
     rotations = np.concatenate([qpos[:, None, 3:7], turns], axis=1)
     return Clip(name, robot_skeleton(robot), dt, qpos[:, :3].copy(), rotations)
 
@@ -75,9 +72,7 @@ def robot_qpos(clip: Clip, robot: Robot) -> np.ndarray:
     turns, axes = clip.rotations[:, order[1:]], _axes(robot)
     angles = 2.0 * np.arctan2(np.einsum("fji,ji->fj", turns[..., 1:], axes), turns[..., 0])
     angles = (angles + np.pi) % (2.0 * np.pi) - np.pi
-    vectors = (angles[..., None] * axes).reshape(-1, 3)
-    exact = from_scipy(Rotation.from_rotvec(vectors), angles.shape)
-    beside = to_scipy(multiply(inverse(exact), turns)).magnitude().reshape(angles.shape)
+    beside = angle_between(exp(angles[..., None] * axes), turns)
     frame, joint = np.unravel_index(np.argmax(beside), beside.shape)
     if beside[frame, joint] > np.radians(0.1):
         raise ConfigError(

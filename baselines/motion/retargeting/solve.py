@@ -12,7 +12,7 @@ from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
 
 from .clearance import ClearanceLimit
-from .limbs import Limbs
+from .limbs import Limbs, sole_corners
 from .targets import BodyTargets, low_pass
 from .tasks import FrameTasks, SolesTask
 
@@ -120,7 +120,7 @@ class FrameIk:
         self.robot, self.model = robot, robot.model
         self.frame = FrameTasks(robot, limbs, names)
         self.configuration = self.frame.configuration
-        self.planted = [_corners(robot, self.configuration.data, i) for i in range(2)]
+        self.planted = [sole_corners(robot, self.configuration.data, i) for i in range(2)]
         self.near = mink.PostureTask(self.model, 1.0)
         self.soles = SolesTask([sole.body for sole in robot.soles], self.configuration)
         self.damping = LEAST_DAMPING
@@ -183,12 +183,5 @@ class FrameIk:
     def sole_error(self) -> float:
         """Largest distance of a corner of a sole from where it is planted [m]."""
         data = self.configuration.data
-        gaps = [_corners(self.robot, data, i) - self.planted[i] for i in range(2)]
+        gaps = [sole_corners(self.robot, data, i) - self.planted[i] for i in range(2)]
         return float(max(np.linalg.norm(gap, axis=1).max() for gap in gaps))
-
-
-def _corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:
-    """(k, 3) corners of a sole in the world [m]."""
-    sole = robot.soles[foot]
-    corners = np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position
-    return data.xpos[sole.body_id] + corners @ data.xmat[sole.body_id].reshape(3, 3).T

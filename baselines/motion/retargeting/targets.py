@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 import scipy  # loads its parts when they are first asked for
 
@@ -12,7 +11,6 @@ from poise.baselines.motion.clips.rotations import heading_angle
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
-from poise.envs.robots.robot import Robot
 
 from .limbs import Limbs
 
@@ -66,21 +64,14 @@ def clip_targets(
     height = (points["pelvis"] - points["feet"])[:, 2]
     upright = max(float(height.max()), UPRIGHT * clip.skeleton.leg_length)
     names = [name for name in LINES if arms or name not in ARMS]
-    directions = {n: _unit(points[LINES[n][1]] - points[LINES[n][0]]) for n in names}
-    low_passed = {n: _unit(low_pass(d, smooth)) for n, d in directions.items()}
+    low_passed = {n: _unit(low_pass(_direction(n, points), smooth)) for n in names}
     return BodyTargets(low_passed, low_pass(height, smooth) / upright)
 
 
-def standing_targets(robot: Robot, limbs: Limbs) -> BodyTargets:
+def standing_targets(limbs: Limbs) -> BodyTargets:
     """The targets, of one frame, that the robot meets in its standing posture."""
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(robot.model, data)
-    places = {role: point.place(data) for role, point in limbs.points.items()}
     names = [name for name in LINES if limbs.has_arms or name not in ARMS]
-    return BodyTargets(
-        {n: _unit(places[LINES[n][1]] - places[LINES[n][0]])[None] for n in names}, np.ones(1)
-    )
+    return BodyTargets({n: _direction(n, limbs.standing)[None] for n in names}, np.ones(1))
 
 
 def between_standing(clip: BodyTargets, standing: BodyTargets, lead: float) -> BodyTargets:
@@ -129,6 +120,12 @@ def low_pass(values: np.ndarray, cutoff: float) -> np.ndarray:
         return values
     sections = scipy.signal.butter(2, cutoff, fs=1.0 / RATE, output="sos")
     return scipy.signal.sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, 15))
+
+
+def _direction(segment: str, points: dict[str, np.ndarray]) -> np.ndarray:
+    """Unit vectors (…, 3) along a segment between points (…, 3)."""
+    first, second, _ = LINES[segment]
+    return _unit(points[second] - points[first])
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -62,11 +61,7 @@ def find_tracks(
     nearest = np.abs(clip.times[:, None] - times).argmin(axis=1)
     stood, facing = stood[nearest], np.unwrap(clip.facing())
     body = clip_targets(clip, limbs.has_arms, cutoff, 0.0)
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(robot.model, data)
-    mine = {role: point.place(data) for role, point in limbs.points.items()}
-    roles, places = clip.skeleton.roles, clip.places()
+    mine, roles, places = limbs.standing, clip.skeleton.roles, clip.places()
     scale = limbs.leg_length / clip.skeleton.leg_length
     hips, feet = (np.stack([places[:, roles[f"{role}_{side}"]] for side in SIDES], axis=1)
                   for role in ("hip", "ankle"))  # fmt: skip

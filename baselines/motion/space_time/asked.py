@@ -41,16 +41,10 @@ class Asked:
         self.tasks.aim(self.targets, frame)
         return self.tasks.errors()
 
-    def errors_and_jacobian(self, scene: Scene, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """(m,) W e and its derivative (m, nv)."""
-        return self.errors(scene, frame), self.tasks.jacobian()
-
     def clearance(self, scene: Scene, frame: int) -> list[Rows]:
         """d ≥ d₀ for the pairs of geometries that are near, see `ClearanceLimit`."""
         data, found = scene.at(frame), []
-        for pair in self.limit.candidates(data):
-            if frozenset(pair[:2]) in self.touching.get(frame, ()):
-                pair = Pair(pair.first, pair.second, 0.0)
+        for pair in self._near(scene, frame):
             distance, row = self.limit.row(data, pair)
             if row is not None:
                 least = np.array([pair.kept])
@@ -60,11 +54,15 @@ class Asked:
     def too_near(self, scene: Scene, frame: int) -> float:
         """Σ (d₀ − d) over the pairs that are nearer than they are to be [m]."""
         data, ends, total = scene.at(frame), np.empty(6), 0.0
-        for pair in self.limit.candidates(data):
-            if frozenset(pair[:2]) in self.touching.get(frame, ()):
-                pair = Pair(pair.first, pair.second, 0.0)
+        for pair in self._near(scene, frame):
             total += max(pair.kept - self.limit.distance(data, pair, ends), 0.0)
         return total
+
+    def _near(self, scene: Scene, frame: int) -> list[Pair]:
+        """The pairs that are near, and how far apart each is to be."""
+        touching = self.touching.get(frame, ())
+        return [pair._replace(kept=0.0) if frozenset(pair[:2]) in touching else pair
+                for pair in self.limit.candidates(scene.at(frame))]  # fmt: skip
 
 
 def soles_over_floor(scene: Scene, stance: Stance, frame: int) -> list[Rows]:

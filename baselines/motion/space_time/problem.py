@@ -83,9 +83,8 @@ class Problem:
         scene, nv = self.scene, self.scene.model.nv
         errors, jacobians, moves, penalised = [], [], [], self._wanted()
         for frame in range(len(scene)):
-            error, jacobian = self.asked.errors_and_jacobian(scene, frame)
-            errors.append(error)
-            jacobians.append(sparse.csr_matrix(jacobian))
+            errors.append(self.asked.errors(scene, frame))
+            jacobians.append(sparse.csr_matrix(self.asked.tasks.jacobian()))
             if 0 < frame < len(scene) - 1:
                 moves.append(motions(scene, self.stance, frame))
                 rows = self.asked.clearance(scene, frame)

@@ -12,7 +12,7 @@ from poise.baselines.balance.references.robot_clip import FEWEST, About, RobotCl
 from poise.baselines.balance.references.stances import why_not_home
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.feasibility.check import FeasibilityLimits
-from poise.baselines.motion.feasibility.ends import Attempt, End
+from poise.baselines.motion.feasibility.edges import Attempt, End
 from poise.baselines.motion.feasibility.physical import (
     TIME_PRICE,
     JoinPart,

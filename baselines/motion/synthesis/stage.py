@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.groups import GROUPS
+from poise.baselines.motion.clips.skeleton import GROUPS
 from poise.baselines.motion.graphs.adjacency import Frames, end_to_begin, frames_of, with_clip
 from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
 from poise.baselines.motion.graphs.motion_graph import GraphClip, MotionGraph, Transition
@@ -23,7 +23,7 @@ class Stage:
     Attributes:
         graph: with a node for every clip.
         clips: name → clip; `frames` likewise.
-        derived: name of a clip that a script made → its text.
+        derived: the clips that scripts made, named by their text.
         others: clips that there are, too, and that are not loaded.
     """
 
@@ -35,7 +35,7 @@ class Stage:
         self.clips = {name: clips[name] for name in graph.names}
         self.frames = {name: self._frames(name, clip) for name, clip in self.clips.items()}
         self.packed, self.others = graph.names, tuple(others)
-        self.derived: dict[str, str] = {}
+        self.derived: set[str] = set()
 
     def _frames(self, name: str, clip: Clip) -> Frames:
         return frames_of(clip, planted=True if self.graph.robot else None)._replace(name=name)
@@ -47,16 +47,14 @@ class Stage:
         ends = [full for full in self.packed if full.endswith(f"_{name}")]
         return ends[0] if len(ends) == 1 else None
 
-    def add(self, text: str, clip: Clip) -> str:
-        """Make a derived clip a node of the graph; its name."""
+    def add(self, text: str, clip: Clip) -> None:
+        """Make a derived clip a node of the graph."""
         if clip.duration > LONGEST:
             raise ConfigError(f"lasts {clip.duration:.0f} s, at most {LONGEST:g} s are made")
         self.clips[text] = replace(clip, name=text)
         self.frames[text] = self._frames(text, self.clips[text])
-        entry = GraphClip(text, "", clip.duration)
-        self.graph = with_clip(self.graph, entry, self.frames)
-        self.derived[text] = text
-        return text
+        self.graph = with_clip(self.graph, GraphClip(text, "", clip.duration), self.frames)
+        self.derived.add(text)
 
     def by_hand(self, before: str, after: str, duration: float | None) -> Transition:
         """The transition from end to begin, of a duration [s] or of the best one."""

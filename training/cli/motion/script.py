@@ -9,8 +9,7 @@ import tyro
 from poise.baselines.motion.graphs.adjacency import make_graph
 from poise.baselines.motion.graphs.motion_graph import StatePlace, Thresholds, Weight, write_graph
 from poise.baselines.motion.synthesis.scripts.library import between, find_script
-from poise.baselines.motion.synthesis.scripts.printer import sequence_text
-from poise.baselines.motion.synthesis.scripts.table import to_csv
+from poise.baselines.motion.synthesis.scripts.printer import sequence_text, to_csv
 from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import read_yaml
 from poise.configs.schema import build

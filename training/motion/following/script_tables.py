@@ -3,7 +3,7 @@
 from rich.console import Console
 from rich.markup import escape
 
-from poise.baselines.motion.graphs.components import strong_clips
+from poise.baselines.motion.graphs.moments import strong_clips
 from poise.baselines.motion.graphs.motion_graph import MotionGraph
 from poise.baselines.motion.synthesis.synthesis import Plan
 from poise.training.running.tables import text_table

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
-from poise.baselines.motion.graphs.components import strong_clips
+from poise.baselines.motion.graphs.moments import strong_clips
 from poise.baselines.motion.graphs.motion_graph import MotionGraph
 
 from .page_svg import tag

@@ -33,7 +33,7 @@ def insert(before: Clip, after: Clip, duration: float, order: int = 3) -> Clip:
     after = after.moved(np.append(a.root[:2] + advance - b.root[:2], 0.0))
     times = np.arange(1, count) * before.dt
     middle = hermite(a, state_at(after, 0), duration, times, order)
-    return _joined([(before.root, before.rotations), middle, (after.root, after.rotations)], before)
+    return _joined(before, len(before), [middle], after, 0)
 
 
 def hermite(
@@ -88,10 +88,7 @@ def cross(before: Clip, after: Clip, duration: float, weight: str = "smooth") ->
     tail, head = slice(len(before) - count - 1, None), slice(0, count + 1)
     root = before.root[tail] + w[:, None] * (after.root[head] - before.root[tail])
     rotations = slerp(before.rotations[tail], after.rotations[head], w[:, None])
-    kept = slice(0, len(before) - count - 1)
-    parts = [(before.root[kept], before.rotations[kept]), (root, rotations),
-             (after.root[count + 1 :], after.rotations[count + 1 :])]  # fmt: skip
-    return _joined(parts, before)
+    return _joined(before, tail.start, [(root, rotations)], after, head.stop)
 
 
 def capture(before: Clip, after: Clip, duration: float) -> Clip:
@@ -115,10 +112,8 @@ def capture(before: Clip, after: Clip, duration: float) -> Clip:
     from_seam = _offset(-0.5 * gap, -rate, bend, backwards, span, u)[::-1]
     head = slice(0, count + 1)
     bent_b = plus(after.root[head], after.rotations[head], from_seam)
-    kept = slice(0, len(before) - count - 1)
-    parts = [(before.root[kept], before.rotations[kept]), bent_a, (bent_b[0][1:], bent_b[1][1:]),
-             (after.root[count + 1 :], after.rotations[count + 1 :])]  # fmt: skip
-    return _joined(parts, before)
+    seam_once = bent_b[0][1:], bent_b[1][1:]
+    return _joined(before, tail.start, [bent_a, seam_once], after, head.stop)
 
 
 def inertial(before: Clip, after: Clip, half_life: float) -> Clip:
@@ -135,8 +130,7 @@ def inertial(before: Clip, after: Clip, half_life: float) -> Clip:
     y, times = 2.0 * np.log(2.0) / half_life, after.times[:, None]
     offset = np.exp(-y * times) * (gap + (rate + y * gap) * times)
     bent = plus(after.root, after.rotations, offset)
-    parts = [(before.root[:-1], before.rotations[:-1]), bent]
-    return _joined(parts, before)
+    return _joined(before, len(before) - 1, [bent], after, len(after))
 
 
 #: kind → join of two clips and a duration [s]
@@ -178,8 +172,7 @@ def _prepared(before: Clip, after: Clip, duration: float, kind: str) -> tuple[Cl
     Raises ConfigError for two skeletons, and for a duration of fewer than 2 frames.
     """
     ours, theirs = before.skeleton, after.skeleton
-    same = ours.names == theirs.names and np.allclose(ours.offsets, theirs.offsets, atol=1e-6)
-    if not same:
+    if ours.names != theirs.names or not np.allclose(ours.offsets, theirs.offsets, atol=1e-6):
         raise ConfigError(f"{after.name!r} has another skeleton than {before.name!r}", field=kind)
     count = round(duration / before.dt)
     if count < SHORTEST:
@@ -194,9 +187,14 @@ def _placed(clip: Clip, place: np.ndarray) -> Clip:
     return clip.moved((place - clip.root[0]) * np.array([1.0, 1.0, 0.0]))
 
 
-def _joined(parts: list[tuple[np.ndarray, np.ndarray]], like: Clip) -> Clip:
+def _joined(
+    before: Clip, kept: int, between: list[tuple[np.ndarray, np.ndarray]], after: Clip, first: int
+) -> Clip:
+    """The first frames of A, postures (n, 3), (n, J, 4) between, and B from a frame on."""
+    parts = [(before.root[:kept], before.rotations[:kept]), *between,
+             (after.root[first:], after.rotations[first:])]  # fmt: skip
     root, rotations = (np.concatenate([part[i] for part in parts]) for i in range(2))
-    return replace(like, root=root, rotations=rotations, support=None)
+    return replace(before, root=root, rotations=rotations, support=None)
 
 
 def _vector_rates(gap: np.ndarray, rate: np.ndarray) -> np.ndarray:
@@ -218,10 +216,8 @@ def _offset(
     """(n, 3 + 3J) offsets from 0, at rest, to `end` with the seam's rate and acceleration."""
     speed = span * _offset_rate(end, rate, own.rate)
     bent = span**2 * (bend - own.acceleration)
-    c3, c4, c5 = (
-        10.0 * end - 4.0 * speed + 0.5 * bent,
-        -15.0 * end + 7.0 * speed - bent,
-        (6.0 * end - 3.0 * speed + 0.5 * bent),
-    )
+    c3 = 10.0 * end - 4.0 * speed + 0.5 * bent
+    c4 = -15.0 * end + 7.0 * speed - bent
+    c5 = 6.0 * end - 3.0 * speed + 0.5 * bent
     s = u[:, None]
     return s**3 * (c3 + s * (c4 + s * c5))

@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.rotations import from_scipy, inverse, multiply, rotate, to_scipy
+from poise.baselines.motion.clips.rotations import exp, inverse, log, multiply, rotate
 
 
 class State(NamedTuple):
@@ -40,16 +39,6 @@ def plus(
     """Posture (…, 3), (…, J, 4) at the end of tangents (…, 3 + 3J): x + v and q Exp(v)."""
     turns = tangent[..., 3:].reshape(*tangent.shape[:-1], -1, 3)
     return root + tangent[..., :3], multiply(rotations, exp(turns))
-
-
-def log(quaternions: np.ndarray) -> np.ndarray:
-    """Rotation vectors (…, 3) [rad] of unit quaternions (…, 4), on the shorter way."""
-    return to_scipy(quaternions).as_rotvec().reshape(*quaternions.shape[:-1], 3)
-
-
-def exp(vectors: np.ndarray) -> np.ndarray:
-    """Unit quaternions (…, 4) of rotation vectors (…, 3) [rad]."""
-    return from_scipy(Rotation.from_rotvec(vectors.reshape(-1, 3)), vectors.shape[:-1])
 
 
 def vector_rate(turn: np.ndarray, rate: np.ndarray) -> np.ndarray:

@@ -101,25 +101,21 @@ class InverseKinematics(Copyable):
         least, first = np.inf, self.chain.clipped(best) if self.options.limits else best
         for count in range(1, restarts + 2):
             if count > 1:
-                first = self._random(objective, rng)
-            q, steps = self._descend(objective, first)
+                chances = rng.uniform(*self.chain.free, (SAMPLES, len(self.chain.qpos)))
+                first = min(chances, key=objective.value)
+            if self.method == BOUNDED:
+                q, steps = solve_bounded(objective, first, self.options)
+            else:
+                q, steps = self._step_by_step(misses, first)
             taken += steps
             if (value := objective.value(q)) < least:
                 best, least = q, value
             if self.prior is None and self._residual(misses, best) <= self.options.tolerance:
                 break
-        return self._result(misses, best, whole, taken, count, least)
-
-    def _random(self, objective: Objective, rng: np.random.Generator) -> np.ndarray:
-        """Of `SAMPLES` random positions (n,) those with the least objective."""
-        chances = rng.uniform(*self.chain.free, (SAMPLES, len(self.chain.qpos)))
-        return min(chances, key=objective.value)
-
-    def _descend(self, objective: Objective, q: np.ndarray) -> tuple[np.ndarray, int]:
-        """From a start (n,) to the best positions that the method finds, and its steps."""
-        if self.method == BOUNDED:
-            return solve_bounded(objective, q, self.options)
-        return self._step_by_step(objective.misses, q)
+        residual = self._residual(misses, best)
+        within = bool(np.all(np.abs(best - self.chain.clipped(best)) <= SLACK))
+        return IkResult(self.chain.whole(best, whole), residual, taken, count,
+                        residual <= self.options.tolerance, within, least)  # fmt: skip
 
     def _step_by_step(self, misses: Misses, q: np.ndarray) -> tuple[np.ndarray, int]:
         """Steps until the goals are reached, or the residual becomes no smaller."""
@@ -147,14 +143,6 @@ class InverseKinematics(Copyable):
             raise ConfigError(f"must be {len(self.robot.standing_qpos)} finite numbers",
                               field="start")  # fmt: skip
         return posture
-
-    def _result(
-        self, misses: Misses, q: np.ndarray, start: np.ndarray, taken: int, count: int, least: float
-    ) -> IkResult:
-        residual = self._residual(misses, q)
-        within = bool(np.all(np.abs(q - self.chain.clipped(q)) <= SLACK))
-        return IkResult(self.chain.whole(q, start), residual, taken, count,
-                        residual <= self.options.tolerance, within, least)  # fmt: skip
 
 
 def solve_ik(

@@ -26,15 +26,15 @@ class Apart(Constraint):
 
     def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
         """One row a frame."""
-        first, second = scene.point(self.point, "point"), scene.point(self.to, "to")
+        points = scene.between(self.point, self.to)
         low, high = np.array([self.distance]), np.array([np.inf])
         for frame in frames:
             data = scene.at(frame)
-            between = first.place(data) - second.place(data)
+            between = points.place(data)
             length = float(np.linalg.norm(between))
             way = between / length if length > 1e-9 else np.array([0.0, 1.0, 0.0])
-            moved = first.jacobian(scene.model, data) - second.jacobian(scene.model, data)
-            yield Rows({frame: way[None] @ moved}, np.array([length]), low, high)
+            derivative = way[None] @ points.jacobian(scene.model, data)
+            yield Rows({frame: derivative}, np.array([length]), low, high)
 
     def about(self) -> str:
         return f"{self.point} and {self.to} apart by {self.distance:g} m"

@@ -9,7 +9,7 @@ import numpy as np
 from poise.configs.errors import ConfigError
 
 from .constraint import Constraint
-from .scene import Rows, Scene
+from .scene import Difference, Rows, Scene
 
 LINES = {"hips": "hip", "shoulders": "shoulder"}
 
@@ -38,11 +38,10 @@ class Heading(Constraint):
             raise ConfigError(f"the robot {scene.robot.name!r} has no {self.of}", field="of",
                               choices=("hips",))  # fmt: skip
         left, right = (scene.limbs.points[f"{LINES[self.of]}_{s}"] for s in ("left", "right"))
-        bound = np.array([np.radians(self.within)])
+        line, bound = Difference(left, right), np.array([np.radians(self.within)])
         for frame in frames:
             data = scene.at(frame)
-            x, y, _ = left.place(data) - right.place(data)
-            moved = left.jacobian(scene.model, data) - right.jacobian(scene.model, data)
+            (x, y, _), moved = line.place(data), line.jacobian(scene.model, data)
             off = np.arctan2(-x, y) - np.radians(self.angle)
             off = (off + np.pi) % (2.0 * np.pi) - np.pi
             derivative = (x * moved[1:2] - y * moved[0:1]) / (x * x + y * y)

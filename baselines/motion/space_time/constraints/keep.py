@@ -27,21 +27,13 @@ class Keep(Constraint):
 
     def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
         """p − y, three rows a frame; y is the middle of its places in the whole period."""
-        points = [scene.point(self.point, "point")]
-        points += [scene.point(self.to, "to")] if self.to is not None else []
-        places = {f: _difference([p.place(scene.at(f)) for p in points])
-                  for f in self.frames(scene).tolist()}  # fmt: skip
+        point, bound = scene.between(self.point, self.to), np.full(3, self.within)
+        places = {f: point.place(scene.at(f)) for f in self.frames(scene).tolist()}
         among = np.array(list(places.values()))
         middle = 0.5 * (among.min(axis=0) + among.max(axis=0))
         for frame in frames:
-            data = scene.at(frame)
-            derivative = _difference([p.jacobian(scene.model, data) for p in points])
-            bound = np.full(3, self.within)
+            derivative = point.jacobian(scene.model, scene.at(frame))
             yield Rows({frame: derivative}, places[frame] - middle, -bound, bound, shared=True)
 
     def about(self) -> str:
         return f"keep {self.point}" + (f" to {self.to}" if self.to else "")
-
-
-def _difference(values: list[np.ndarray]) -> np.ndarray:
-    return values[0] - values[1] if len(values) == 2 else values[0]

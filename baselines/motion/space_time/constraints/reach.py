@@ -34,17 +34,14 @@ class Reach(Constraint):
 
     def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
         """p − place, a row for each given coordinate."""
-        points = [(scene.point(self.point, "point"), 1.0)]
-        points += [(scene.point(self.to, "to"), -1.0)] if self.to is not None else []
+        point = scene.between(self.point, self.to)
         given = [i for i, value in enumerate(self.place) if value is not None]
         goal = np.array([self.place[i] for i in given])
         bound = np.full(len(given), self.within)
         for frame in frames:
             data = scene.at(frame)
-            place = np.sum([sign * p.place(data) for p, sign in points], axis=0)
-            moved = [sign * p.jacobian(scene.model, data) for p, sign in points]
-            derivative = np.sum(moved, axis=0)
-            yield Rows({frame: derivative[given]}, place[given] - goal, -bound, bound)
+            derivative = point.jacobian(scene.model, data)[given]
+            yield Rows({frame: derivative}, point.place(data)[given] - goal, -bound, bound)
 
     def about(self) -> str:
         place = ", ".join("free" if value is None else f"{value:g}" for value in self.place)

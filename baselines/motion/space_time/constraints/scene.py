@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import mujoco
 import numpy as np
 
-from poise.baselines.motion.retargeting.limbs import Limbs, Point
+from poise.baselines.motion.retargeting.limbs import Limbs, Point, sole_corners
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
@@ -41,6 +41,21 @@ class CentreOfMass(NamedTuple):
         jacobian = np.empty((3, model.nv))
         mujoco.mj_jacSubtreeCom(model, data, jacobian, self.root)
         return jacobian
+
+
+class Difference(NamedTuple):
+    """One point as seen from another, in the world's axes."""
+
+    point: Placed
+    origin: Placed
+
+    def place(self, data: mujoco.MjData) -> np.ndarray:
+        """(3,) [m]."""
+        return self.point.place(data) - self.origin.place(data)
+
+    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """(3, nv)."""
+        return self.point.jacobian(model, data) - self.origin.jacobian(model, data)
 
 
 class Rows(NamedTuple):
@@ -130,6 +145,11 @@ class Scene:
             return self.limbs.points[name]
         return Point(((self.body(name, field, (COM, *self.limbs.points)), np.zeros(3)),))
 
+    def between(self, name: str, to: str | None) -> Placed:
+        """The point of a name, from another one if that is named; their fields: point and to."""
+        point = self.point(name, "point")
+        return point if to is None else Difference(point, self.point(to, "to"))
+
     def body(self, name: str, field: str, others: Iterable[str] = ()) -> int:
         """The body of this name; ConfigError names the choices."""
         names = [self.model.body(i).name for i in range(1, self.model.nbody)]
@@ -140,10 +160,7 @@ class Scene:
 
     def corners(self, foot: int) -> np.ndarray:
         """(k, 3) corners of a sole in the posture that was seen last [m]."""
-        sole = self.robot.soles[foot]
-        corners = np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position
-        axes = self.data.xmat[sole.body_id].reshape(3, 3)
-        return self.data.xpos[sole.body_id] + corners @ axes.T
+        return sole_corners(self.robot, self.data, foot)
 
     def padded_corners(self, foot: int) -> np.ndarray:
         """(k, 3) the same, the last one again up to the number of corners of the other sole."""

@@ -97,7 +97,7 @@ def _scaled(clip: Clip, factor: float) -> Clip:
 
 def test_ways_begin_at_standing_and_meet_the_clip(squat: Clip) -> None:
     robot = robot_named("humanoid")
-    standing = standing_targets(robot, find_limbs(robot))
+    standing = standing_targets(find_limbs(robot))
     targets = clip_targets(squat, arms=True, smooth=3.0)
     whole = between_standing(targets, standing, 1.0)
     for name, values in whole.directions.items():

@@ -13,10 +13,9 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.retargeting.retarget import targets_on
 from poise.baselines.motion.space_time.asked import Asked, soles_over_floor
-from poise.baselines.motion.space_time.constraints.constraint import Constraint, violation
+from poise.baselines.motion.space_time.constraints.constraint import Constraint, When, violation
 from poise.baselines.motion.space_time.constraints.height import Height
 from poise.baselines.motion.space_time.constraints.keep import Keep
-from poise.baselines.motion.space_time.constraints.period import When
 from poise.baselines.motion.space_time.constraints.reach import Reach
 from poise.baselines.motion.space_time.constraints.scene import Scene
 from poise.baselines.motion.space_time.problem import Problem

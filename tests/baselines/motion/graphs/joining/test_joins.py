@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.clips.rotations import angle_between, from_scipy
+from poise.baselines.motion.clips.rotations import angle_between, exp, from_scipy
 from poise.baselines.motion.graphs.joining.joins import (
     JOINS,
     capture,
@@ -20,7 +20,6 @@ from poise.baselines.motion.graphs.joining.joins import (
 )
 from poise.baselines.motion.graphs.joining.states import (
     State,
-    exp,
     minus,
     plus,
     state_at,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from poise.baselines.motion.space_time.constraints.period import Period, When, frames_of
+from poise.baselines.motion.space_time.constraints.constraint import Period, When, frames_of
 from poise.configs.errors import ConfigError
 from tests.support.scenes import DT, LEAD, swaying
 

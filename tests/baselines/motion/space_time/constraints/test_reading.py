@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from poise.baselines.motion.space_time.constraints.period import When
+from poise.baselines.motion.space_time.constraints.constraint import When
 from poise.baselines.motion.space_time.constraints.reach import Reach
 from poise.baselines.motion.space_time.constraints.reading import (
     check_constraints,

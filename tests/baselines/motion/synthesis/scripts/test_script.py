@@ -12,12 +12,7 @@ import pytest
 
 from poise.baselines.motion.synthesis.scripts.library import find_script
 from poise.baselines.motion.synthesis.scripts.parser import parse, read_script
-from poise.baselines.motion.synthesis.scripts.printer import text_of
-from poise.baselines.motion.synthesis.scripts.table import (
-    plain,
-    table_of,
-    to_csv,
-)
+from poise.baselines.motion.synthesis.scripts.printer import plain, table_of, text_of, to_csv
 from poise.baselines.motion.synthesis.scripts.tree import (
     Arrow,
     ClipName,
