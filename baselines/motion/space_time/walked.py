@@ -19,9 +19,10 @@ LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
 REACHES = 0.47  # [hω] that `walk-fast` gets to, whatever it is told
-ASKED = 1.07  # times a clip's speed is told to the policy at most, which is slower than told
+ASKED = 1.06  # times a clip's speed is told to the policy at most, which is slower than told
 FAST_ROBOTS = ("humanoid",)  # for which the others are; others fall
 BANK, LEARNED_BANK = 0.07, 0.0875  # [g] of speed times turning rate, above which robots fall
+ASKED_BANK = 0.091  # [g] of what the policy is told in curves at most
 ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, that the policy knows
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
@@ -102,7 +103,7 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     if learned:
         commands[:, 4] = 0.0  # it was trained at its gait's own
         bent = float(np.abs(commands[:, 1] * commands[:, 3]).max())
-        asked = max(min(ASKED, most / max(bent, 1e-9)), 1.0)
+        asked = max(min(ASKED, ASKED_BANK * robot.units.gravity / max(bent, 1e-9)), 1.0)
         commands[:, 1:3] *= asked
         return Walked(commands, tempo, LEARNED, asked)
     commands[:, 4] = _swings(commands, h, omega)

@@ -86,9 +86,9 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
     """By the controller that reaches it; the policy is told more than it reaches."""
     robot, h_omega = robot_named(HUMANOID), 2.779
     commands, tempo, walker, asked = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
-    assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.07
+    assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.06
     assert commands[:, 1] == pytest.approx(asked * tempo * 1.9 * 1.2 * 0.9, abs=0.06)
-    assert commands[:, 1].max() <= 1.07 * 0.585 * h_omega + 1e-3
+    assert commands[:, 1].max() <= 1.06 * 0.585 * h_omega + 1e-3
     assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.9 / tempo, rel=0.3)
     with pytest.raises(ConfigError, match=r"at 1\.6\d m/s at most, 0\.\d\d of it") as refused:
         find_commands(make("walk")[0].at_speed(1.9), robot, 0.9, least=tempo + 0.01)
@@ -107,6 +107,7 @@ def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
     commands, tempo, walker, asked = find_commands(clip, robot, 0.9)
     assert walker == "residual-walk-fast" and 0.7 <= tempo < 0.75
     assert (commands[:, 4] == 0.0).all() and 1.5 < commands[:, 1].max() / asked < 1.6
+    assert asked > 1.03 and (commands[:, 1] * commands[:, 3]).max() <= 0.0911 * 9.81
     other = find_commands(clip, robot_named("compact"), 0.9)
     assert other.walker == "walk" and other.tempo < tempo
     made = retarget_clip(clip, robot)
