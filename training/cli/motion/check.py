@@ -128,7 +128,8 @@ def follow(
     from poise.training.motion.following.fastest import STARTS, find_fastest
     from poise.training.motion.following.follow import follow as perform
     from poise.training.motion.following.tables import print_followed
-    from poise.training.pictures.figures.playback import check_size, check_video
+    from poise.training.pictures.figures.encoder import check_video
+    from poise.training.pictures.figures.playback import check_size
     from poise.training.pictures.motion_report.film import Film
     from poise.training.pictures.motion_report.page import check_page
     from poise.training.pictures.motion_report.performance import Watched, write_performance

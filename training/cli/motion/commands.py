@@ -166,7 +166,7 @@ def bring(
     from poise.baselines.balance.references.robot_clip import write_robot_clip
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.training.motion.following.tables import print_retargeted
-    from poise.training.pictures.figures.playback import check_video
+    from poise.training.pictures.figures.encoder import check_video
 
     check_out_file(out)
     if video is not None:
@@ -219,7 +219,8 @@ def play(
     """
     from poise.baselines.balance.references.robot_clip import check_robot, read_robot_clip
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
-    from poise.training.pictures.figures.playback import check_size, check_video, write_playback
+    from poise.training.pictures.figures.encoder import check_video
+    from poise.training.pictures.figures.playback import check_size, write_playback
 
     check_video(video)
     check_out_file(video)
@@ -242,13 +243,13 @@ def _film(
     """Film a motion, with the skeleton of its clip beside it."""
     from poise.baselines.motion.clips.contacts import over_ground
     from poise.baselines.motion.retargeting.tracks import first_heading
-    from poise.training.pictures.figures.playback import beside_of, write_playback
+    from poise.training.pictures.figures.playback import Skeleton, write_playback
 
     clip, heading = made.clip, None
     if clip.planted is not None and not clip.free:
         heading = first_heading(source)
     source = over_ground(source) if made.tempo == 1.0 else source.at_speed(made.tempo)
-    beside = beside_of(body, source, made.scale, made.begins, heading, made.stride)
+    beside = Skeleton(body, source, made.scale, made.begins, heading, made.stride)
     print(f"{write_playback(video, body, clip.qpos, clip.dt, beside, size)} frames")
     print(video)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.configs.errors import PoiseError
+from poise.configs.errors import ConfigError, PoiseError
 
 CRF = 20  # quality of H.264, lower is better: 18 is visually lossless
 FORMS: dict[str, dict[str, Any]] = {
@@ -19,6 +19,12 @@ FORMS: dict[str, dict[str, Any]] = {
     ".webp": {"codec": "libwebp_anim", "pix_fmt_out": "yuv420p",
               "output_params": ["-quality", "70", "-loop", "0"]},
 }  # fmt: skip
+
+
+def check_video(path: str | Path) -> None:
+    """Raise ConfigError for a path that is no video's."""
+    if Path(path).suffix.lower() not in FORMS:
+        raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=path)
 
 
 class Encoder:

@@ -17,7 +17,7 @@ from poise.envs.viewing.offscreen import OffScreen
 from poise.envs.viewing.overlays import BAR, SPHERE, Mark, draw
 from poise.envs.viewing.renderer import LOOK_AT
 
-from .encoder import FORMS, Encoder
+from .encoder import Encoder
 from .palette import ORANGE
 
 RATE = 25.0  # [1/s] of the frames
@@ -27,25 +27,27 @@ MOST_GEOMS = 2_000
 STILL = 0.3  # [m] by which what is looked at may move before the camera follows
 
 
-class Skeletons:
-    """A clip's bones as marks, as large as the robot, with the lowest joint on the ground.
+class Skeleton:
+    """A clip's bones as marks, as large as the robot, on the ground to the left of where it stands.
 
     Args:
+        robot: that stands.
         clip: whose frames.
         scale: the robot's size over the clip's.
         begins: time of the playback at which the clip begins [s]; its ends are held.
-        place: (3,) where its root stands over the ground at its begin [m].
-        size: the robot's CoM height [m].
+        heading: where the robot has ahead in the clip [rad]; None: where it faces at its begin.
         stride: share of its way over the ground that it goes, so that it stays beside a robot whose
             steps are shorter.
     """
 
     def __init__(
-        self, clip: Clip, scale: float, begins: float, place: np.ndarray, size: float,
+        self, robot: Robot, clip: Clip, scale: float, begins: float, heading: float | None = None,
         stride: float = 1.0,
     ):  # fmt: skip
-        self.clip, self.begins, self.size = clip, begins, size
-        places = scale * clip.places()
+        self.begins, self.size = begins, robot.height_com
+        self.clip = clip.turned(-(float(clip.facing()[0]) if heading is None else heading))
+        place = np.append(robot.standing_qpos[:2] + [0.0, BESIDE * self.size], 0.0)
+        places = scale * self.clip.places()
         places -= places[0, 0] * [1.0, 1.0, 0.0] + [0.0, 0.0, float(places[..., 2].min())]
         way = (places[:, :1] - places[0, 0]) * [1.0, 1.0, 0.0]
         self.places = places + place - (1.0 - stride) * way
@@ -70,7 +72,7 @@ class Skeletons:
 
 
 def playback_frames(
-    robot: Robot, qpos: np.ndarray, dt: float, skeleton: Skeletons | None, size: tuple[int, int]
+    robot: Robot, qpos: np.ndarray, dt: float, skeleton: Skeleton | None, size: tuple[int, int]
 ) -> Iterator[np.ndarray]:
     """Frames (height, width, 3) uint8, 25 a second, of postures (F, nq) `dt` [s] apart.
 
@@ -99,7 +101,7 @@ def playback_frames(
 
 
 def looked_at(
-    root: np.ndarray, dt: float, times: np.ndarray, skeleton: Skeletons | None
+    root: np.ndarray, dt: float, times: np.ndarray, skeleton: Skeleton | None
 ) -> np.ndarray:
     """(n, 2) between robot and skeleton, smoothed over a second; still where they hardly move."""
     middle = root[np.minimum(np.round(times / dt).astype(int), len(root) - 1)]
@@ -110,12 +112,6 @@ def looked_at(
     return np.asarray(gaussian_filter1d(middle, 0.5 * RATE, axis=0, mode="nearest"))
 
 
-def check_video(path: Path) -> None:
-    """Raise ConfigError for a path that is no video's."""
-    if path.suffix.lower() not in FORMS:
-        raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=path)
-
-
 def check_size(size: tuple[int, int]) -> None:
     """Raise ConfigError for a size that no video has."""
     if any(edge < 16 or edge > 4096 or edge % 2 for edge in size):
@@ -123,7 +119,7 @@ def check_size(size: tuple[int, int]) -> None:
 
 
 def write_playback(
-    path: Path, robot: Robot, qpos: np.ndarray, dt: float, skeleton: Skeletons | None = None,
+    path: Path, robot: Robot, qpos: np.ndarray, dt: float, skeleton: Skeleton | None = None,
     size: tuple[int, int] = (640, 480),
 ) -> int:  # fmt: skip
     """Write the video and return its number of frames; the file appears whole or not at all.
@@ -136,18 +132,3 @@ def write_playback(
             video.send(frame)
             count += 1
     return count
-
-
-def beside_of(
-    robot: Robot, clip: Clip, scale: float, begins: float, heading: float | None = None,
-    stride: float = 1.0,
-) -> Skeletons:  # fmt: skip
-    """The skeleton of a clip to the left of a robot that stands.
-
-    `heading` is where the robot has ahead in the clip [rad]; None: where it faces at its begin. The
-    rest is as of `Skeletons`.
-    """
-    size = robot.height_com
-    place = np.append(robot.standing_qpos[:2] + [0.0, BESIDE * size], 0.0)
-    turned = clip.turned(-(float(clip.facing()[0]) if heading is None else heading))
-    return Skeletons(turned, scale, begins, place, size, stride)

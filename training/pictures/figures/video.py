@@ -14,7 +14,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.renderer import SceneRenderer
 
-from .encoder import FORMS, Encoder
+from .encoder import Encoder, check_video
 from .style import saved_figure
 
 INK = (20, 20, 20)  # of names over pictures
@@ -242,8 +242,7 @@ def frame_strip(
 
 
 def _check(path: str | Path, fps: float, slow_motion: float, size: tuple[int, int]) -> None:
-    if Path(path).suffix.lower() not in FORMS:
-        raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=path)
+    check_video(path)
     for name, value in (("fps", fps), ("slow_motion", slow_motion)):
         if not (np.isfinite(value) and value > 0.0):
             raise ConfigError(f"must be positive, not {value}", field=name)

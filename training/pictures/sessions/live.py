@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Protocol
 
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.robot_clip import RobotClip
@@ -17,74 +16,28 @@ from poise.envs.robots.robot import Robot
 
 from .frames import Frame, Observer
 from .session import Session, load_player
-from .spec import SessionSpec, Spec, TrialSpec
+from .spec import SessionSpec, TrialSpec
 
 KEPT = 30.0  # [s] of a session that can be scrubbed through
 LONGEST_FILM = 60.0  # [s]
 Frames = tuple[Frame, ...]  # of all robots at one moment
 
 
-class Play(Protocol):
-    """Something with a timeline; `history[at]` is what is shown."""
-
-    names: list[str]  #: of the controllers
-    robot: Robot
-    period: float  #: between two frames [s]
-    at: int
-    live: bool  #: whether it can be pushed
-    reasons: Mapping[str, str]  #: controller → why it lost a recorded trial
-
-    @property
-    def history(self) -> Sequence[Frames]:
-        """All moments that can be shown."""
-
-    @property
-    def yaw(self) -> float:
-        """Of the heading at the reset, which directions are relative to [rad]."""
-
-    @property
-    def spec(self) -> Spec:
-        """What shows the same again."""
-
-    @property
-    def gait(self) -> GaitCommand | None:
-        """What those that walk are told now; None where nothing walks."""
-
-    @property
-    def reach(self) -> Reach | None:
-        """What all those that walk can be told; None where one of them does not say."""
-
-    @property
-    def ended(self) -> bool:
-        """Whether there is nothing more to play."""
-
-    def step(self) -> None:
-        """Go on by one frame."""
-
-    def reset(self) -> None:
-        """Go back to the start."""
-
-    def film(self, name: str, path: Path) -> None:
-        """Write an MP4 of one controller, from the start to now.
-
-        Raises PoiseError: nothing can be drawn or encoded here.
-        """
-
-    def push(self, **fields: object) -> Push:
-        """Push every robot now; raises ConfigError or PoiseError where that cannot be."""
-
-    def walk(self, **fields: object) -> TimedCommand:
-        """Tell those that walk a command; raises ConfigError or PoiseError where that cannot be."""
-
-
 class Live:
-    """A session and the frames of its last seconds.
+    """A session and the frames of its last seconds; `history[at]` is what is shown.
 
     Args:
         session: that goes on.
         spec: what it was loaded from.
         motion: that is performed; None: they stand.
         seen: postures that are seen as a ghost while they stand.
+
+    Attributes:
+        names: of the controllers.
+        period: between two frames [s].
+        live: whether it can be pushed.
+        ended: whether there is nothing more to play.
+        reasons: controller → why it lost a recorded trial.
     """
 
     live, ended = True, False
@@ -113,17 +66,17 @@ class Live:
 
     @property
     def gait(self) -> GaitCommand | None:
-        """What those that walk are told now."""
+        """What those that walk are told now; None where nothing walks."""
         return self.session.command if self.session.walks else None
 
     @property
     def reach(self) -> Reach | None:
-        """What all those that walk can be told."""
+        """What all those that walk can be told; None where one of them does not say."""
         return self.session.reach
 
     @property
     def yaw(self) -> float:
-        """Of the heading at the reset [rad]."""
+        """Of the heading at the reset, which directions are relative to [rad]."""
         return self.session.sides[0].env.simulation.start_yaw
 
     def step(self) -> None:
@@ -145,7 +98,10 @@ class Live:
         return self.session.walk(**fields)
 
     def film(self, name: str, path: Path) -> None:
-        """Play the same again by another agent, and write an MP4 of it."""
+        """Play the same again by another agent, and write an MP4 of it.
+
+        Raises PoiseError: nothing can be drawn or encoded here.
+        """
         from poise.training.pictures.figures.video import record
 
         time = self.session.time
@@ -171,19 +127,20 @@ class Live:
 
 
 class Recorded:
-    """Frames that were recorded before; see `recorded_trial`."""
+    """Frames that were recorded before, see `recorded_trial`; attributes as of `Live`.
+
+    `film` writes an MP4 of one controller.
+    """
 
     live, yaw, gait, reach = False, 0.0, None, None
-    reasons: Mapping[str, str]
 
     def __init__(
         self, spec: TrialSpec, robot: Robot, history: Sequence[Frames], period: float,
-        film: Callable[[str, Path], object], reasons: Mapping[str, str] | None = None,
+        film: Callable[[str, Path], object], reasons: Mapping[str, str],
     ):  # fmt: skip
         self.spec, self.names = spec, list(spec.controllers)
-        self.robot, self.period = robot, period
-        self.history, self.at, self._film = history, 0, film
-        self.reasons = reasons or {}
+        self.robot, self.period, self.reasons = robot, period, reasons
+        self.history, self.at, self.film = history, 0, film
 
     @property
     def ended(self) -> bool:
@@ -198,10 +155,6 @@ class Recorded:
         """Show the first frame."""
         self.at = 0
 
-    def film(self, name: str, path: Path) -> None:
-        """Write an MP4 of one controller."""
-        self._film(name, path)
-
     def push(self, **fields: object) -> Push:
         """Raises PoiseError: what is over cannot be pushed."""
         raise PoiseError("a recorded trial cannot be pushed, what poise view CONTROLLER plays can")
@@ -209,6 +162,9 @@ class Recorded:
     def walk(self, **fields: object) -> TimedCommand:
         """Raises PoiseError: what is over takes no command."""
         raise PoiseError("a recorded trial takes no command, what poise view CONTROLLER plays does")
+
+
+Play = Live | Recorded  # something with a timeline
 
 
 def _push_text(push: Push) -> str:

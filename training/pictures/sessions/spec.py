@@ -100,15 +100,21 @@ def read_link(query: str, now: Spec, names: Collection[str]) -> Spec | None:
             none.
     """
     given = parse_qs(query)
-    _check_count(tuple(given.get("controller", ())))
+    controllers = tuple(given.get("controller", now.controllers))
+    if len(controllers) > MOST:
+        raise ConfigError(f"at most {MOST} side by side, not {len(controllers)}",
+                          field="controller")  # fmt: skip
     if isinstance(now, TrialSpec):
-        return _trial(given, now)
+        if "trial" not in given:
+            return None
+        trial = _number(given["trial"][-1], "trial")
+        return replace(now, trial=trial, controllers=controllers)
     known = ("controller", "robot", "motion", "seed", "push", "command")
     if not any(name in given for name in known):
         return None
     spec = replace(
         now,
-        controllers=tuple(given.get("controller", now.controllers)),
+        controllers=controllers,
         robot=given.get("robot", [now.robot])[-1],
         motion=given.get("motion", [STANDING])[-1],
         seed=_number(given.get("seed", ["0"])[-1], "seed"),
@@ -119,19 +125,6 @@ def read_link(query: str, now: Spec, names: Collection[str]) -> Spec | None:
         if name not in names:
             raise ConfigError(f"a link may name what is packaged alone, not {shown(name)}")
     return spec
-
-
-def _trial(given: dict[str, list[str]], now: TrialSpec) -> TrialSpec | None:
-    if "trial" not in given:
-        return None
-    controllers = tuple(given.get("controller", now.controllers))
-    return replace(now, trial=_number(given["trial"][-1], "trial"), controllers=controllers)
-
-
-def _check_count(controllers: tuple[str, ...]) -> None:
-    if len(controllers) > MOST:
-        raise ConfigError(f"at most {MOST} side by side, not {len(controllers)}",
-                          field="controller")  # fmt: skip
 
 
 def _number(text: str, field: str) -> int:

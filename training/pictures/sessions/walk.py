@@ -25,7 +25,7 @@ from poise.envs.viewing.camera import Camera, beside
 from poise.training.benchmarking.trials.agents import Agent, check_may_walk, check_walks, load_agent
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.pictures.figures.encoder import FORMS
+from poise.training.pictures.figures.encoder import check_video
 from poise.training.pictures.figures.video import record
 
 from .loading import read_pushes
@@ -71,9 +71,8 @@ def walk(
         ConfigError: a number, a name or a file that is not valid; a controller that does not walk.
         PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
     """
-    if video is not None and Path(video).suffix.lower() not in FORMS:
-        raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=video)
     if video is not None:
+        check_video(video)
         check_out_file(video, "video")
     if seed < 0:
         raise ConfigError(f"must be at least 0, not {seed}", field="seed")

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -13,22 +12,14 @@ from mjviser.conversions import get_geom_texture_id, merge_geoms
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.appearance import looks
 from poise.envs.viewing.quantities import RGB
+from poise.training.pictures.sessions.frames import Frame
+from poise.training.pictures.sessions.ghost import Poses
 
 from .marks import linear
 
 AZIMUTH = 50.0  # of the lamp in the copy of the model, which viser does not use
 VISIBLE_GROUPS = 3  # of geoms, as in MuJoCo's own viewer
 Mesh = viser.BatchedMeshHandle | viser.BatchedGlbHandle
-
-
-class Posed(Protocol):
-    """Where the bodies of a robot are, world axes: (nbody, 3) [m]; (nbody, 4), w first."""
-
-    @property
-    def positions(self) -> np.ndarray: ...
-
-    @property
-    def quaternions(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -69,7 +60,7 @@ class Robots:
             for k, geoms in enumerate(_parts(self.model, body))
         ]
 
-    def show(self, frames: Sequence[Posed], offsets: np.ndarray) -> None:
+    def show(self, frames: Sequence[Frame | Poses], offsets: np.ndarray) -> None:
         """Put each robot where its frame says, moved by its offset (count, 3) [m]."""
         positions = np.stack([f.positions for f in frames], axis=1) + offsets  # (nbody, count, 3)
         quaternions = np.stack([f.quaternions for f in frames], axis=1)
