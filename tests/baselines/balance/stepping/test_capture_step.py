@@ -26,6 +26,7 @@ from poise.baselines.registry import controller_config, load_controller
 from poise.configs.errors import ConfigError
 from poise.configs.schema import to_dict
 from poise.envs.robots.menagerie import WHEEL
+from tests.support import planned
 from tests.support import stepping_reference as readable
 from tests.support.shared import robot
 
@@ -207,7 +208,7 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             steps.append(c.steps)
             stood.clear()
             stance = 1 - c.foot
-            region, overreach = regions.one(stance, feet[stance], yaw), 0.0
+            region, overreach = planned.alone(regions, stance, feet[stance], yaw), 0.0
             ground, stride = feet[stance, 2], c.swing.foothold - feet[stance, :2]
             if left[0] > readable.FROZEN:  # the last ticks keep what was fed back
                 planner.phase = c.planner.feedback.signals[PHASE]
