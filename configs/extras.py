@@ -25,5 +25,5 @@ def needing(extra: str, source: str | Path | None = None) -> Iterator[None]:
         yield
     except ImportError as error:
         raise ConfigError(
-            f"needs the package {error.name}: {how_to_install(extra)}", source=source
+            f"needs the package {error.name or error}: {how_to_install(extra)}", source=source
         ) from None

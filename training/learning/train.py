@@ -235,10 +235,10 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
         robot = coarser_robot(robot, config.physics_step)
     env = config.make_training_env(robot)
     check_pushes(config, env)
+    moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(config.replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
-    if config.ppo.symmetric:
-        moments: Any = MirroredMeanStd(env.mirrors()[0])
+    if moments is not None:
         normalize.obs_rms = moments
     return normalize
 

@@ -124,6 +124,8 @@ def _remove_parts(path: Path) -> None:
 def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except (OSError, OverflowError) as error:
-        return not isinstance(error, ProcessLookupError)  # else it is of another user
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # it is of another user
+        return True
     return True

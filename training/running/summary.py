@@ -304,8 +304,8 @@ class Loss(TypedDict):
 
 
 class Entry(Counts, EnvelopeFigures, Fractions, total=False):
-    """A controller. The counts are of the part that is rated, else of all trials; `played`,
-    `errors`, in which it raised, and `losses`, the most frequent cause first, are of all."""
+    """A controller. The counts are of the part that is rated, else of all trials. Of all are
+    `played`, `errors`, in which it raised, and `losses`, the most frequent cause first."""
 
     played: Required[int]
     errors: Required[int]

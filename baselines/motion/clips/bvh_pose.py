@@ -81,6 +81,7 @@ def rooted_at_hips(posed: Posed, roles: dict[str, int]) -> Posed:
     old = posed.skeleton
     ways = [way_up(old.parents, joint) for joint in roles.values()]
     shared = [joint for joint in ways[0] if all(joint in way for way in ways)] if ways else []
+    # the joint on which all that have roles hang
     top = shared[0] if shared else _first_branch(old.parents)
     if top == 0:
         return _kept(posed, np.arange(len(old.names)), posed.root, posed.turns, old.offsets, roles)

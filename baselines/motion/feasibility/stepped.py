@@ -13,7 +13,7 @@ SMALL = 1e-3  # [s] of the differences that velocities and accelerations are
 
 
 def sample_stepped(planted: PlantedRobot, motion: ReferenceMotion, times: np.ndarray) -> Trajectory:
-    """The whole robot at `times` (n,) [s], in the motion's own frame: its root is where its CoM is.
+    """The whole robot at `times` (n,) [s], in the motion's own frame.
 
     Velocities and accelerations are central differences.
     """

@@ -23,7 +23,7 @@ from .motion_graph import (
     Weight,
     earliest_part,
     latest_part,
-    place_in_order,
+    transition_order,
 )
 
 SAMPLING = 1.0 / 15.0  # [s] between frames that are compared
@@ -199,7 +199,7 @@ def with_clip(graph: MotionGraph, entry: GraphClip, frames: dict[str, Frames]) -
             found, reason = transitions_between(frames[a], frames[b], graph.thresholds)
             transitions += found
             refused += [] if found else [(a, b, reason)]
-    transitions.sort(key=place_in_order)
+    transitions.sort(key=transition_order)
     return replace(graph, clips=(*graph.clips, entry), transitions=tuple(transitions),
                    refused=tuple(refused))  # fmt: skip
 

@@ -71,7 +71,7 @@ class Transition:
 
 
 #: sorts transitions by clips, then by times
-place_in_order = attrgetter("before", "after", "leave", "enter")
+transition_order = attrgetter("before", "after", "leave", "enter")
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from poise.configs.errors import ConfigError, shown
 
 from .layers import Layers
-from .motion_graph import MotionGraph, Transition, place_in_order
+from .motion_graph import MotionGraph, Transition, transition_order
 from .paths import Path, Task
 
 CHECKS = 200  # of the best path, before the search gives up
@@ -42,7 +42,7 @@ def best_paths(
         if not paths:
             raise layers.no_way(known)
         used = {s.after for path in paths for s in path.steps if s.after is not None}
-        new = sorted(used - set(known) - set(task.arrows.values()), key=place_in_order)
+        new = sorted(used - set(known) - set(task.arrows.values()), key=transition_order)
         if check is None or not new:
             return paths
         known |= {transition: check(transition) for transition in new}

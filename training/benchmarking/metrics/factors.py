@@ -7,10 +7,9 @@ from poise.training.benchmarking.statistics.eurobench import (
     energy_factor,
     force_factor,
     human_reach,
-    mean_or_none,
     stability_margin,
 )
-from poise.training.benchmarking.statistics.rates import mcnemar
+from poise.training.benchmarking.statistics.rates import mcnemar, mean_or_none
 from poise.training.benchmarking.suites.factors import STANDARD
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.running.summary import Eurobench, Factor, Level, MarginFigures

@@ -12,8 +12,7 @@ from poise.training.benchmarking.statistics.bootstrap import (
     EnvelopeFit,
     mean_over_directions,
 )
-from poise.training.benchmarking.statistics.eurobench import mean_or_none
-from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.statistics.rates import mean_or_none, wilson_interval
 from poise.training.benchmarking.suites.motions import PART, STANDING
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.jobs import Stage

@@ -6,8 +6,11 @@ from typing import cast
 import numpy as np
 
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
-from poise.training.benchmarking.statistics.eurobench import mean_or_none
-from poise.training.benchmarking.statistics.rates import poisson_interval, wilson_interval
+from poise.training.benchmarking.statistics.rates import (
+    mean_or_none,
+    poisson_interval,
+    wilson_interval,
+)
 from poise.training.benchmarking.suites.walking import WALKING
 from poise.training.benchmarking.trials.trial import Outcome
 from poise.training.running.summary import (

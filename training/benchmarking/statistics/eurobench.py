@@ -6,7 +6,6 @@ the stability margin and the normalisation by size those of "Reaction to impulsi
 Where the protocols leave a choice open, it is made here and said.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,9 +144,3 @@ def energy_factor(size: Size, reach_of_human: float) -> float:
 def human_reach(direction: float) -> float:
     """Half the human's base [m] in a direction [deg]: that of the frontal or the lateral case."""
     return HUMAN_DEPTH if abs(np.cos(np.radians(direction))) > np.sqrt(0.5) else HUMAN_WIDTH
-
-
-def mean_or_none(values: Sequence[float | None]) -> float | None:
-    """Mean of the values that there are."""
-    found = [value for value in values if value is not None]
-    return float(np.mean(found)) if found else None

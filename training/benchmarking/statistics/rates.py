@@ -212,3 +212,9 @@ def _finite(scores: ArrayLike) -> np.ndarray:
     if table.size == 0 or not np.all(np.isfinite(table)):
         raise ValueError("scores must be finite and at least one")
     return table
+
+
+def mean_or_none(values: Sequence[float | None]) -> float | None:
+    """Mean of the values that there are."""
+    found = [value for value in values if value is not None]
+    return float(np.mean(found)) if found else None

@@ -243,13 +243,13 @@ def _film(
     """Film a motion, with the skeleton of its clip beside it."""
     from poise.baselines.motion.clips.contacts import over_ground
     from poise.baselines.motion.retargeting.tracks import first_heading
-    from poise.training.pictures.figures.playback import Skeleton, write_playback
+    from poise.training.pictures.figures.playback import SkeletonMarks, write_playback
 
     clip, heading = made.clip, None
     if clip.planted is not None and not clip.free:
         heading = first_heading(source)
     source = over_ground(source) if made.tempo == 1.0 else source.at_speed(made.tempo)
-    beside = Skeleton(body, source, made.scale, made.begins, heading, made.stride)
+    beside = SkeletonMarks(body, source, made.scale, made.begins, heading, made.stride)
     print(f"{write_playback(video, body, clip.qpos, clip.dt, beside, size)} frames")
     print(video)
 

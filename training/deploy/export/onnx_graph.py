@@ -1,7 +1,6 @@
 """A policy as an ONNX graph: raw observations in, actions out."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,7 @@ class _Graph:
             (self.array(f"layer{i}.weight", weight), self.array(f"layer{i}.bias", bias))
             for i, (weight, bias) in enumerate(policy.layers)
         ]
-        activate = self.elu if policy.config.ppo.activation == "elu" else partial(self.op, "Tanh")
+        activate = {"tanh": self.tanh, "elu": self.elu}[policy.config.ppo.activation]
 
         def mean(observation: str) -> str:
             """The mean action, before its limits; a symmetric policy passes the layers twice."""
@@ -108,6 +107,9 @@ class _Graph:
         self.tensors.append(order)
         picked = self.op("Gather", values, order.name, axis=1)
         return self.op("Mul", picked, self.array(f"{name}.sign", mirror.sign))
+
+    def tanh(self, x: str) -> str:
+        return self.op("Tanh", x)
 
     def elu(self, x: str) -> str:
         """max(x, 0) + exp(min(x, 0)) − 1: runtimes have Elu with 32 bits only."""

@@ -46,7 +46,7 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
     normalize = VecNormalize(ThreadedVecEnv([env]), gamma=config.ppo.gamma)
     restore_statistics(source / STATISTICS, normalize)
     limits = read_statistics(source / STATISTICS, ("clip_obs", "epsilon"))
-    normalize.clip_obs, normalize.epsilon = (float(value) for value in limits.values())
+    normalize.clip_obs, normalize.epsilon = float(limits["clip_obs"]), float(limits["epsilon"])
     normalize.training = normalize.norm_reward = False  # it no longer learns, and leaves rewards
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a batch that one environment cannot fill

@@ -21,7 +21,7 @@ def load_and_write(name: str) -> tuple[Robot, Path | None]:
 
     One is written to the current folder for a model alone, called as it, where there is no file
     of that name, which may be somebody's work; what is missing in it, such as torque limits, is
-    then asked for by its name. It has what is not the default, and the model's whole path.
+    then asked for by its name. The file has what is not the default, and the model's whole path.
 
     Raises ConfigError as `load_robot` and `guess`.
     """

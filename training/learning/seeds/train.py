@@ -87,6 +87,7 @@ def train_seeds(
     with FolderLock(out):
         _all_seeds(given, out, resume)  # another process may have begun since
         executor = Executor(backend, workers)
+        # what is to be trained; below, at the end, what came of it
         write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
         write_atomic(
             out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n"

@@ -17,7 +17,7 @@ from poise.configs.outputs import check_out_folder
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.benchmarking.evaluation.tick_times import Clocked
-from poise.training.benchmarking.statistics.eurobench import mean_or_none
+from poise.training.benchmarking.statistics.rates import mean_or_none
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import Agent, check_walks, load_agent
 from poise.training.benchmarking.trials.play import run_trial

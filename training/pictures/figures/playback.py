@@ -27,7 +27,7 @@ MOST_GEOMS = 2_000
 STILL = 0.3  # [m] by which what is looked at may move before the camera follows
 
 
-class Skeleton:
+class SkeletonMarks:
     """A clip's bones as marks, as large as the robot, on the ground to the left of where it stands.
 
     Args:
@@ -72,7 +72,7 @@ class Skeleton:
 
 
 def playback_frames(
-    robot: Robot, qpos: np.ndarray, dt: float, skeleton: Skeleton | None, size: tuple[int, int]
+    robot: Robot, qpos: np.ndarray, dt: float, skeleton: SkeletonMarks | None, size: tuple[int, int]
 ) -> Iterator[np.ndarray]:
     """Frames (height, width, 3) uint8, 25 a second, of postures (F, nq) `dt` [s] apart.
 
@@ -101,7 +101,7 @@ def playback_frames(
 
 
 def looked_at(
-    root: np.ndarray, dt: float, times: np.ndarray, skeleton: Skeleton | None
+    root: np.ndarray, dt: float, times: np.ndarray, skeleton: SkeletonMarks | None
 ) -> np.ndarray:
     """(n, 2) between robot and skeleton, smoothed over a second; still where they hardly move."""
     middle = root[np.minimum(np.round(times / dt).astype(int), len(root) - 1)]
@@ -119,7 +119,7 @@ def check_size(size: tuple[int, int]) -> None:
 
 
 def write_playback(
-    path: Path, robot: Robot, qpos: np.ndarray, dt: float, skeleton: Skeleton | None = None,
+    path: Path, robot: Robot, qpos: np.ndarray, dt: float, skeleton: SkeletonMarks | None = None,
     size: tuple[int, int] = (640, 480),
 ) -> int:  # fmt: skip
     """Write the video and return its number of frames; the file appears whole or not at all.

@@ -11,7 +11,7 @@ from poise.configs.kinds import OfKind
 
 from .scene import Rows, Scene
 
-FIELD = "period"
+PERIOD = "period"
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ def frames_of(period: Period, scene: Scene) -> np.ndarray:
         found = np.flatnonzero(inside & scene.planted[:, list(sides)].all(axis=1))
         if not found.size:
             raise ConfigError(f"the feet {period.contact!r} are never planted",
-                              field=f"{FIELD}.contact")  # fmt: skip
+                              field=f"{PERIOD}.contact")  # fmt: skip
         return found
     begin, end = _times(period, scene)
     text = f"[{begin:g}, {end:g}] s of a clip from 0 to {scene.duration:.2f} s"
     if begin > end:
-        raise ConfigError(f"ends before it begins: {text}", field=FIELD)
+        raise ConfigError(f"ends before it begins: {text}", field=PERIOD)
     if isinstance(period, When) and period.at is not None:
         nearest = int(np.argmin(np.abs(scene.times - begin)))
         found = np.flatnonzero(inside & (np.arange(len(scene)) == nearest))
@@ -60,7 +60,7 @@ def frames_of(period: Period, scene: Scene) -> np.ndarray:
         half = 0.5 * scene.dt
         found = np.flatnonzero(inside & (scene.times >= begin - half) & (scene.times <= end + half))
     if not found.size:
-        raise ConfigError(f"has no frames: {text}", field=FIELD)
+        raise ConfigError(f"has no frames: {text}", field=PERIOD)
     return found
 
 

@@ -16,12 +16,12 @@ from poise.training.benchmarking.statistics.eurobench import (
     energy_factor,
     force_factor,
     human_reach,
-    mean_or_none,
     recovery_time,
     stability_margin,
     sway_angle,
     sway_velocity,
 )
+from poise.training.benchmarking.statistics.rates import mean_or_none
 
 
 def test_sway_is_the_angle_of_the_line_from_the_ankles() -> None:

@@ -11,14 +11,14 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.retargeting.tracks import first_heading
 from poise.training.cli.entry import main
-from poise.training.pictures.figures.playback import Skeleton, looked_at
+from poise.training.pictures.figures.playback import SkeletonMarks, looked_at
 from tests.support.physics import robot_named
 
 
 def test_the_skeleton_stands_beside_and_moves_with_the_clip() -> None:
     robot = robot_named("humanoid")
     clip = read_bvh(find_bvh("humanoid_squat")).clip
-    skeleton = Skeleton(robot, clip, 0.9, begins=1.0)
+    skeleton = SkeletonMarks(robot, clip, 0.9, begins=1.0)
     assert skeleton.places[..., 2].min() == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(skeleton.places[0, 0, :2],
                                robot.standing_qpos[:2] + [0.0, robot.height_com])  # fmt: skip
@@ -34,7 +34,7 @@ def test_the_skeleton_stands_beside_and_moves_with_the_clip() -> None:
 def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> None:
     robot = robot_named("humanoid")
     clip = read_bvh(find_bvh("humanoid_walk")).clip.repeated(5)
-    whole, half = (Skeleton(robot, clip, 0.9, 1.0, first_heading(clip), stride)
+    whole, half = (SkeletonMarks(robot, clip, 0.9, 1.0, first_heading(clip), stride)
                    for stride in (1.0, 0.5))  # fmt: skip
     end = 1.0 + clip.duration
     ways = [skeleton.root(end) - skeleton.root(0.0) for skeleton in (whole, half)]
@@ -46,7 +46,7 @@ def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> No
     seen = looked_at(root, 1.0 / 25.0, times, half)
     assert seen[-1] == pytest.approx(0.5 * half.root(end), abs=0.1)  # smoothed
     assert np.abs(np.diff(seen, axis=0)).max() < 0.05
-    still = Skeleton(robot, read_bvh(find_bvh("humanoid_squat")).clip, 0.9, 1.0)
+    still = SkeletonMarks(robot, read_bvh(find_bvh("humanoid_squat")).clip, 0.9, 1.0)
     assert np.ptp(looked_at(root, 1.0 / 25.0, times, still), axis=0).max() == 0.0
 
 
