@@ -159,7 +159,7 @@ def carried(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _inside(
-    allowance: Allowance, function: Callable[P, R], *arguments: P.args, **options: P.kwargs
+    allowance: Allowance, function: Callable[P, R], /, *arguments: P.args, **options: P.kwargs
 ) -> R:
     with _opened(allowance.names, allowance.source):
         return function(*arguments, **options)

@@ -7,8 +7,8 @@ from poise.baselines.balance.stepping.planning.config import (
     CaptureStepConfig,
     StepLimits,
     SwingTask,
-    number,
 )
+from poise.baselines.balance.stepping.planning.units import number
 from poise.baselines.whole_body.gains import MomentumQPConfig
 
 from .models.lip import Lip

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from poise.baselines.balance.stepping.planning.config import in_si
+from poise.baselines.balance.stepping.planning.units import in_si
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.robots.robot import Robot

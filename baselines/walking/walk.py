@@ -14,9 +14,10 @@ from poise.baselines.balance.stepping.planning.blocks import (
     SwingArrays,
     zeros,
 )
-from poise.baselines.balance.stepping.planning.config import StepLimits, in_si
+from poise.baselines.balance.stepping.planning.config import StepLimits
 from poise.baselines.balance.stepping.planning.swing import swing_gains, swing_task
 from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
+from poise.baselines.balance.stepping.planning.units import in_si
 from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets

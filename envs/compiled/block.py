@@ -100,7 +100,8 @@ def _length(part: int | str, sizes: Mapping[str, int]) -> int:
     if isinstance(part, int):
         return part
     found = re.fullmatch(r"(\d*)([a-z]+)([+-]\d+)?", part)
-    assert found is not None, part
+    if found is None:
+        raise ValueError(f"not a length: {part!r}")
     return int(found[1] or 1) * sizes[found[2]] + int(found[3] or 0)
 
 

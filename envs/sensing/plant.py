@@ -27,8 +27,8 @@ HIGHEST = 0.05  # [m] that a bump is built; an episode lets it down
 
 
 class Plant:
-    """A `simulation` of a robot whose body and ground differ from those of `robot`, and bumps on it
-    if it is `bumpy`.
+    """A `simulation` of a robot whose body and ground differ from those of `robot`; the ground has
+    bumps if it is `bumpy`.
 
     Its model is one of its own. Sizes, names and motors are those of `robot`, so that a controller
     made for that fits; its arrays have the true mass.

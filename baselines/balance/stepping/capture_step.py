@@ -24,11 +24,12 @@ from poise.envs.robots.robot import Robot
 from .controller import STANDING, Stepping, SteppingController
 from .planner import StepPlanner
 from .planning.blocks import CaptureTick, RegionArrays, StepGains, StepMemory, zeros
-from .planning.config import CaptureStepConfig, StepLimits, in_si
+from .planning.config import CaptureStepConfig, StepLimits
 from .planning.cop_region import CopRegion, rest_ahead
 from .planning.recentring import recentring_arrays, stop_recentring
 from .planning.swing import Swing, swing_gains, swing_task
 from .planning.swing_speed import possible_limits
+from .planning.units import in_si
 from .tick import capture_tick
 
 
@@ -93,7 +94,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     two soles, and both QPs have a hard root and one period.
     """
 
-    kernel: Callable[[Any], None] = staticmethod(capture_tick)  #: that a tick runs
+    kernel: Callable[[Any], None] = staticmethod(capture_tick)  #: that a tick of steps runs
 
     def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
         if len(robot.soles) != 2:

@@ -19,11 +19,11 @@ from .planning.config import (
     PivotConfig,
     StepFeedback,
     StepLimits,
-    in_si,
 )
 from .planning.cop_region import CopRegion
 from .planning.feedback import feedback_arrays
 from .planning.search import capture_foothold
+from .planning.units import in_si
 
 
 class StepPlanner(Copyable):

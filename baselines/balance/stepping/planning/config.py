@@ -1,55 +1,18 @@
 """The configuration of the controllers that step, as their YAML files have it.
 
 Numbers are in the units of `in_si`: lengths in h, times in 1/ω and speeds in h ω, with h the height
-of the standing CoM and ω = √(g/h); those of fields without one are in their comments.
+of the standing CoM and ω = √(g/h). A field without a unit is a number, or says its own.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from poise.baselines.whole_body.gains import MomentumQPConfig
-from poise.envs.compiled.block import Block
-from poise.envs.compiled.maths.pendulum import Units
 
-Unit = Literal["", "h", "1/h", "1/ω", "h ω", "h ω²", "ω²", "ω/(m g)", "°"]
-
-
-def number(default: float, unit: Unit = "", **bounds: Any) -> float:
-    """A field with this default, its unit as of `in_si` and bounds as of `schema.build`."""
-    return field(default=default, metadata={"unit": unit, **bounds})
-
-
-def in_si(block: type[Block], config: Any, units: Units) -> dict[str, Any]:
-    """Those numbers of a configuration that a block has under the same names, in SI units."""
-    found: dict[str, Any] = {}
-    h, omega = units.height, units.omega
-    names = {item.name for item in fields(block) if item.type is float}
-    for item in fields(config):
-        if item.name not in names:
-            continue
-        value = getattr(config, item.name)
-        match item.metadata.get("unit", ""):
-            case "h":
-                value = value * h
-            case "1/h":
-                value = value / h
-            case "1/ω":
-                value = value / omega
-            case "h ω":
-                value = value * h * omega
-            case "h ω²":
-                value = value * h * omega**2
-            case "ω²":
-                value = value * omega**2
-            case "ω/(m g)":
-                value = value * omega / units.force
-            case "°":
-                value = np.radians(value)
-        found[item.name] = float(value)
-    return found
+from .units import number
 
 
 @dataclass(frozen=True)

@@ -86,10 +86,10 @@ def double_support_region(
 class CopRegion(Copyable):
     """The region in which soles can put the centre of pressure p with their ankles' torques.
 
-    A sole under a load of λ m g reaches the p of its polygon with |N p − o| ≤ b/λ, see `feet.py`.
-    Two soles reach p = λ p_0 + (1 − λ) p_1, with p_i what sole i reaches under its load: the less a
-    foot carries, the further its ankle can move the pressure. Only `fraction` of each polygon and
-    of each torque limit counts.
+    A sole under a load of λ m g reaches the p of its polygon with |N p − o| ≤ b/λ, see
+    `ankle_limits`. Two soles reach p = λ p_0 + (1 − λ) p_1, with p_i what sole i reaches under its
+    load: the less a foot carries, the further its ankle can move the pressure. Only `fraction` of
+    each polygon and of each torque limit counts.
     """
 
     def __init__(self, robot: Robot, fraction: float = 0.95):

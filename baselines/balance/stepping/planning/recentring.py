@@ -26,7 +26,7 @@ from .blocks import (
     SwingArrays,
     zeros,
 )
-from .config import RecentringConfig, in_si
+from .config import RecentringConfig
 from .feedback import PHASE
 from .search import (
     distance_outside,
@@ -39,6 +39,7 @@ from .search import (
     to_world,
 )
 from .swing import FROZEN, LANDING, start_swing, time_left
+from .units import in_si
 
 # No foot goes back; ξ is shifted to one foot; the other foot swings; it takes up its load.
 INACTIVE, SHIFTING, SWINGING, LOADING = range(4)

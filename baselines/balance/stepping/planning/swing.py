@@ -11,7 +11,8 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 
 from .blocks import SwingArrays, zeros
-from .config import SwingTask, in_si
+from .config import SwingTask
+from .units import in_si
 
 LANDING = 0.6  # fraction of a swing after which contact is touchdown, not the lift-off
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
