@@ -279,6 +279,6 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
         self.kernel(self.block(state, targets))
-        if self.tick(state, targets).to_python[0]:
+        if self._tick is not None and self._tick.to_python[0]:
             return self.qp.torques(state, targets)
         return self.tau[self._motors]

@@ -86,39 +86,43 @@ def train_seeds(
     keeps(out / SEEDS, f"what is trained is kept in {out}; go on with --resume")
     with FolderLock(out):
         _all_seeds(given, out, resume)  # another process may have begun since
-        executor = Executor(backend, workers)
-        # what is to be trained; below, at the end, what came of it
-        write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
-        write_atomic(
-            out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n"
-        )
-        failed: list[str] = []
-        with SeedProgress(runs, console), executor:
-            for run, error in executor.each(train_run, missing):
-                if error is None and not _entry(run)["finished"]:
-                    error = f"{run.folder} is not finished here: do all machines see it?"
-                if error is None:
-                    start, best = evaluations(_entry(run))
-                    console.print(
-                        f"seed {run.config.seed}: recovered {best['recovered']:.1%} at its best, "
-                        f"{start['recovered']:.1%} at the start",
-                        markup=False,
-                        highlight=False,
-                    )
-                else:
-                    failed.append(f"seed {run.config.seed}: {error}")
-        if failed:
-            raise PoiseError(f"{'; '.join(failed)}; what is finished is kept, and --resume goes on")
-        entries = [_entry(run) for run in runs]
-        rates = [[evaluations(entry)[1]["recovered"]] for entry in entries]
-        summary: SeedSummary = {
-            "runs": entries,
-            "recovered": seed_figures(np.array(rates), seeds),
-            **circumstances(started, executor.workers, executor.backend),
-        }
-        write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
-        print_seeds(summary, console)
-        return summary
+        return _train(config, runs, missing, out, Executor(backend, workers), console, started)
+
+
+def _train(
+    config: TrainConfig,
+    runs: Sequence[SeedRun],
+    missing: Sequence[SeedRun],
+    out: Path,
+    executor: Executor,
+    console: Console,
+    started: float,
+) -> SeedSummary:
+    """Train what is missing; writes seeds.json at the start, and whole at the end."""
+    seeds = [run.config.seed for run in runs]
+    write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
+    write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
+    failed: list[str] = []
+    with SeedProgress(runs, console), executor:
+        for run, error in executor.each(train_run, missing):
+            if error is None and not _entry(run)["finished"]:
+                error = f"{run.folder} is not finished here: do all machines see it?"
+            if error is None:
+                console.print(_line(_entry(run)), markup=False, highlight=False)
+            else:
+                failed.append(f"seed {run.config.seed}: {error}")
+    if failed:
+        raise PoiseError(f"{'; '.join(failed)}; what is finished is kept, and --resume goes on")
+    entries = [_entry(run) for run in runs]
+    rates = [[evaluations(entry)[1]["recovered"]] for entry in entries]
+    summary: SeedSummary = {
+        "runs": entries,
+        "recovered": seed_figures(np.array(rates), seeds),
+        **circumstances(started, executor.workers, executor.backend),
+    }
+    write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
+    print_seeds(summary, console)
+    return summary
 
 
 def train_run(run: SeedRun) -> str | None:
@@ -179,3 +183,11 @@ def _entry(run: SeedRun) -> SeedEntry:
         "start": start,
         "best": best,
     }
+
+
+def _line(entry: SeedEntry) -> str:
+    start, best = evaluations(entry)
+    return (
+        f"seed {entry['seed']}: recovered {best['recovered']:.1%} at its best, "
+        f"{start['recovered']:.1%} at the start"
+    )
