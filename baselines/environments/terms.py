@@ -6,7 +6,8 @@ import numpy as np
 
 from poise.baselines.balance.references.targets import Motion
 from poise.baselines.balance.references.tempo import TIME
-from poise.baselines.balance.stepping.planning.blocks import StepMemory, SwingArrays
+from poise.baselines.balance.stepping.planning.blocks import StepMemory
+from poise.baselines.balance.stepping.planning.swing import Swing
 from poise.baselines.balance.stepping.planning.swing import time_left as remaining_time
 from poise.envs.balance.mdp.observation import GROUND, SPACE, Terms, View
 from poise.envs.balance.mdp.terms import TERMS, put_local
@@ -62,7 +63,7 @@ class StepReporter(Block):
     """The memory of a compiled controller's steps, and the report that is made of it."""
 
     memory: StepMemory
-    swing: SwingArrays
+    swing: Swing
     report: np.ndarray  # (7,)
 
 

@@ -12,12 +12,12 @@ left to a task of the objective, and the null space is that of the others.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 
 WHOLE_LEG = 6  # joints that place a foot anywhere
 DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows from the others
@@ -29,15 +29,15 @@ class NullSpace(Block):
 
     held: np.ndarray  # (nh,) int
     free: np.ndarray  # (nv − nh,) int
-    rows: np.ndarray  # (nh, kp) Jᵀ on its way to R, its columns not swapped
-    product: np.ndarray  # as wide as `rows` or `basis`: scratch
-    reflectors: np.ndarray  # (min(k, nh), nh)
-    beta: np.ndarray  # (min(k, nh),)
-    pivot: np.ndarray  # (min(k, nh),) int: the row of J that each reflector eliminates
-    open: np.ndarray  # (k,) bool: rows of J still to be eliminated
+    rows: Annotated[np.ndarray, "nh", "kp"]  # Jᵀ on its way to R, its columns not swapped
+    product: Annotated[np.ndarray, "width"]  # as wide as `rows` or `basis`: scratch
+    reflectors: Annotated[np.ndarray, "steps", "nh"]
+    beta: Annotated[np.ndarray, "steps"]
+    pivot: Annotated[np.ndarray, "steps", np.int64]  # the row of J that each reflector eliminates
+    open: Annotated[np.ndarray, "k", np.bool_]  # rows of J still to be eliminated
     spare: int  # 1 where the weakest row, the last of `pivot`, is no equality; else 0
-    weakest: np.ndarray  # (2,) R, r: that row of J v̇ = b is R x_0 = r, x_0 the first of x
-    basis: np.ndarray  # (nh, 8 or more) null vectors, then v̇₀, as columns
+    weakest: Annotated[np.ndarray, 2]  # R, r: that row of J v̇ = b is R x_0 = r, x_0 the first of x
+    basis: Annotated[np.ndarray, "nh", "np"]  # null vectors, then v̇₀, as columns
 
 
 def allocate_null_space(
@@ -47,21 +47,9 @@ def allocate_null_space(
     k = 6 * len(chains) + 3 * len(points)
     held = np.unique(np.concatenate([*chains, *points]))
     nh, steps, spare = len(held), min(k, len(held)), int(short_legs(chains))
-    width, basis_width = (-(-columns // 8) * 8 for columns in (k, nh - steps + spare + 1))
-    zeros = guarded_zeros
-    return NullSpace(
-        held=held,
-        free=np.setdiff1d(np.arange(nv), held),
-        rows=zeros((nh, width)),
-        product=zeros(max(width, basis_width)),
-        reflectors=zeros((steps, nh)),
-        beta=zeros(steps),
-        pivot=zeros(steps, dtype=np.int64),
-        open=zeros(k, dtype=np.bool_),
-        spare=spare,
-        weakest=zeros(2),
-        basis=zeros((nh, basis_width)),
-    )
+    kp, np_ = (-(-columns // 8) * 8 for columns in (k, nh - steps + spare + 1))
+    sizes = {"nh": nh, "k": k, "kp": kp, "np": np_, "width": max(kp, np_), "steps": steps}
+    return NullSpace.allocate(sizes, held=held, free=np.setdiff1d(np.arange(nv), held), spare=spare)
 
 
 def short_legs(chains: Sequence[np.ndarray]) -> bool:

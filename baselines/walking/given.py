@@ -80,15 +80,10 @@ def _length(surface: Surface) -> float:
 def allocate_treads(config: TreadConfig, surfaces: list[Surface], units: Units) -> Treads:
     """The block of the surfaces on which steps are given."""
     c = config
-    return Treads(
+    return Treads.allocate(
         **in_si(Treads, c, units),
         surfaces=surface_arrays(surfaces),
         hold=np.array([c.hold_up, c.hold_down]),
         rise=np.array([c.rise, c.rise_down]),
         lower=np.array([c.lower, c.lower_down]),
-        leaning=np.zeros(1),
-        left=np.zeros(3),
-        aim=np.zeros(1, dtype=np.int64),
-        target=np.zeros(1),
-        room=np.zeros(2),
     )

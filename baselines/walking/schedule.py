@@ -3,14 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from itertools import pairwise, product
+from typing import Annotated
 
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.pushes.sampler import Range
 
 from .planner.command import ENTRIES, GaitCommand
@@ -135,9 +135,9 @@ def _parse_one(item: object, source: str) -> TimedCommand:
 class Timetable(Block):
     """The commands of an episode as compiled code reads them."""
 
-    start: np.ndarray  # (256,) [s]; infinite behind the last one
-    commands: np.ndarray  # (256, 8) see `GaitCommand.array`
-    following: np.ndarray  # (1,) int: the row that comes next
+    start: Annotated[np.ndarray, MOST_COMMANDS]  # [s]; infinite behind the last one
+    commands: Annotated[np.ndarray, MOST_COMMANDS, ENTRIES]  # see `GaitCommand.array`
+    following: Integer  # the row that comes next
 
     def fill(self, commands: Sequence[TimedCommand]) -> None:
         """Take the commands of an episode that begins."""
@@ -153,11 +153,7 @@ class Timetable(Block):
 
 def empty_timetable() -> Timetable:
     """A timetable without a command."""
-    table = Timetable(
-        start=guarded_zeros(MOST_COMMANDS),
-        commands=guarded_zeros((MOST_COMMANDS, ENTRIES)),
-        following=guarded_zeros(1, dtype=np.int64),
-    )
+    table = Timetable.allocate()
     table.clear()
     return table
 

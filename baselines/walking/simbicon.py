@@ -8,7 +8,7 @@ import numpy as np
 from poise.baselines.balance.in_place.pd import PDGains, joint_gains, motor_torques
 from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.balance.stepping.capture_step import allocate_step_memory
-from poise.baselines.balance.stepping.planning.cop_region import CopRegion
+from poise.baselines.balance.stepping.planning.cop_region import cop_region
 from poise.baselines.controller import BaseController, Targets
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.vectors import rotation_between, turn
@@ -118,13 +118,14 @@ class Simbicon(Commanded, BaseController):
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.rate, self.moment = robot.omega, robot.units.moment
-        self.ankles = CopRegion(robot).middle
+        region = cop_region(robot)
+        self.ankles = region.middle
         self.foot_sign = foot_signs(robot)
         self.legs = [leg_joints(robot, i) for i in range(2)]
         self.stiffness, self.damping = joint_gains(self.arrays, self.config.joints)
         steps = GaitConfig(step_time=self.config.lift_time)
         self.gait = allocate_gait(steps, robot.units, steps.limits)
-        self.memory = allocate_step_memory(CopRegion(robot).arrays)
+        self.memory = allocate_step_memory(region)
         self.reset()
 
     def check_command(self, command: GaitCommand) -> None:

@@ -7,22 +7,15 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
-from poise.baselines.balance.stepping.planning.blocks import (
-    CaptureTick,
-    Search,
-    StepGains,
-    SwingArrays,
-    zeros,
-)
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick, Search, StepGains
 from poise.baselines.balance.stepping.planning.config import StepLimits
-from poise.baselines.balance.stepping.planning.swing import swing_gains, swing_task
+from poise.baselines.balance.stepping.planning.swing import Swing, bind_swings
 from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
 from poise.baselines.balance.stepping.planning.units import in_si
 from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.envs.compiled.maths.pendulum import Units
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 from poise.envs.terrain.flat import Flat
@@ -35,7 +28,7 @@ from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference, leg_task
 from .planner.arms import allocate_arms
 from .planner.blocks import Gait, WalkTick
-from .planner.command import ENTRIES, GaitCommand
+from .planner.command import GaitCommand
 from .planner.reach import Reach, check_command, reach_of
 from .tick import walk_tick
 
@@ -50,12 +43,9 @@ def allocate_gait(
     numbers = in_si(Gait, config, units)
     if limits is None:
         numbers["speed_margin"] = np.inf
-    return Gait(
+    return Gait.allocate(
         **numbers,
         **in_si(Gait, limits or config.limits, units),
-        **zeros(command=ENTRIES, velocity=3, error=2, planned=2, yaw=1, cop=2, middle=2),
-        **zeros(clock=1, step_clock=1),
-        **zeros(np.int64, walking=1, starting=1),
         treads=allocate_treads(config.treads, list(surfaces), units),
     )
 
@@ -167,13 +157,12 @@ class Walk(Commanded, CaptureStep):
         """The same around the block of `capture_tick`."""
         known = self._walk_tick
         if known is None or known.capture is not capture:
-            walk, pair = self._of_gait(capture), guarded_zeros(2)
             model = self._gait_config.model
-            known = WalkTick(
-                capture=capture, walk=walk, gait=self.gait, reference=self.reference,
+            known = WalkTick.allocate(
+                capture=capture, walk=self._of_gait(capture), gait=self.gait,
+                reference=self.reference, arms=self.arms,
                 model=model.bind(self.robot, capture.state, self.reference),
-                arms=self.arms, constant_height=int(model.keeps_height),
-                stance=pair, swinging=guarded_zeros(2),
+                constant_height=int(model.keeps_height),
             )  # fmt: skip
             self._walk_tick = known
         return known
@@ -181,24 +170,19 @@ class Walk(Commanded, CaptureStep):
     def _of_gait(self, capture: CaptureTick) -> CaptureTick:
         """A block with the same memory, and the QPs, the swing and the limits of the gait."""
         gait, units = self._gait_config, self.robot.units
-        task = swing_gains(self.qp.arrays, gait.swing)
-        asked, way, axes = capture.reference_out, self._swing.reference, self.memory.level_frame
-        on_first, on_second, on_both = (
-            self.gait_sets.sets[soles].bind(
-                capture.state, asked, self.gait_sets,
-                [swing_task(foot, way, axes, task) for foot in swinging]
-                + [leg_task(leg, self.reference) for leg in soles if gait.model.has_rows],
-            )
-            for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
+        legs = [leg_task(leg, self.reference) for leg in range(2)] if gait.model.has_rows else ()
+        ticks = bind_swings(
+            self.gait_sets, capture.state, capture.reference_out, gait.swing,
+            self._swing.reference, self.memory.level_frame, legs,
         )  # fmt: skip
         swing = replace(
             capture.swing,
-            **in_si(SwingArrays, gait.swing, units),
+            **in_si(Swing, gait.swing, units),
             apex=gait.swing.clearance * units.height,
         )
         return replace(
             capture, swing=swing,
             gains=replace(capture.gains, **in_si(StepGains, gait, units)),
             search=replace(capture.search, **in_si(Search, self.gait_limits, units)),
-            on_first=on_first, on_second=on_second, on_both=on_both,
+            **ticks,
         )  # fmt: skip

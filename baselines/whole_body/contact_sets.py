@@ -110,10 +110,9 @@ class ContactSet(Copyable):
                 tasks=make_stack([*sets.tasks.values(), *tasks], s, ws, rows),
                 limits=limit_program(sets.limits.values(), s, ws), workspace=ws,
             )  # fmt: skip
-            self.block = ContactTick(
+            self.block = ContactTick.allocate(
+                {"nc": len(self.soles)},
                 source=s, pick=self.pick, problem=problem, memory=sets.memory,
-                load_limits=guarded_zeros(len(self.soles)),
-                limited=guarded_zeros(1, dtype=np.int64),
                 applied=sets.applied, slew=sets.slew, follows=sets.follows, chosen=sets.chosen,
                 index=self.index, assemble=address_of(assemble, problem),
                 solve=address_of(solve, ws),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -24,8 +25,8 @@ class TaskStack(Block):
     A: np.ndarray  # (k, nv)
     b: np.ndarray  # (k,)
     weights: np.ndarray  # (k,)
-    AV: np.ndarray  # (k, n) scratch
-    weighted: np.ndarray  # (k, n) scratch
+    AV: Annotated[np.ndarray, "k", "n"]  # scratch
+    weighted: Annotated[np.ndarray, "k", "n"]  # scratch
     fill: Program  # the kernels of the tasks, each with its rows
 
 
@@ -43,14 +44,7 @@ def make_stack(
         if task.kernel is not None:
             calls.append((task.kernel, tick))
         first = own.stop
-    return TaskStack(
-        A=A,
-        b=b,
-        weights=weights,
-        AV=guarded_zeros((k, n)),
-        weighted=guarded_zeros((k, n)),
-        fill=Program.of(calls),
-    )
+    return TaskStack.allocate({"k": k, "n": n}, A=A, b=b, weights=weights, fill=Program.of(calls))
 
 
 def limit_program(

@@ -4,16 +4,16 @@ One is of all soles, the other of a subset that may change from tick to tick (`c
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.baselines.solvers.dual_active_set import solve_dual
 from poise.baselines.solvers.scaled_rows import INFEASIBLE
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer
 from poise.envs.compiled.calls import Kernel, call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 
 from .parameters import QPParameters
@@ -27,20 +27,15 @@ MAX_ITERATIONS = 200
 class Memory(Block):
     """All that outlives a tick: the torques to fall back on and the count of failures."""
 
-    torques: np.ndarray  # (nj,) of the last solved tick [N·m]
+    torques: Annotated[np.ndarray, "nj"]  # of the last solved tick [N·m]
     damping: np.ndarray  # (nj,) joint-space damping to fall back on [N·m·s/rad]
-    streak: np.ndarray  # (1,) int: failures since then
-    failures: np.ndarray  # (1,) int: failures since the reset
+    streak: Integer  # failures since then
+    failures: Integer  # failures since the reset
 
 
 def allocate_memory(torque_limit: np.ndarray) -> Memory:
     """Return an empty memory for joints with `torque_limit` (nj,) [N·m]."""
-    return Memory(
-        torques=guarded_zeros(len(torque_limit)),
-        damping=torque_limit / FALLBACK_SPEED,
-        streak=guarded_zeros(1, dtype=np.int64),
-        failures=guarded_zeros(1, dtype=np.int64),
-    )
+    return Memory.allocate({"nj": len(torque_limit)}, damping=torque_limit / FALLBACK_SPEED)
 
 
 def forget(memory: Memory) -> None:
@@ -119,8 +114,8 @@ class ContactTick(Block):
     pick: np.ndarray  # (nc,) int: the soles of the subset
     problem: Assembly  # with these soles only
     memory: Memory
-    load_limits: np.ndarray  # (nc,) [N]
-    limited: np.ndarray  # (1,) int: 1 where these limits count
+    load_limits: Annotated[np.ndarray, "nc"]  # [N]
+    limited: Integer  # 1 where these limits count
     applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
     slew: np.ndarray  # (nv−6,) the most that they may change [N·m]
     follows: np.ndarray  # (1,) int: 1 where there was a last tick

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.baselines.solvers.dual_active_set import iscratch_size, scratch_size
 from poise.baselines.solvers.null_space import NullSpace, allocate_null_space
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, sole_chains
 
@@ -31,12 +32,12 @@ class Workspace(Block):
     first_point: int  # constraint: those before are the soles'
     first_torque: int
     first_joint: int
-    rows: np.ndarray  # (r, n)
-    offsets: np.ndarray  # (r,)
-    desired: np.ndarray  # (r,) what each should be
-    weights: np.ndarray  # (r,) of the squared differences
-    weighted: np.ndarray  # (r, n) rows times weights
-    values: np.ndarray  # (r,) at the solution
+    rows: Annotated[np.ndarray, "r", "n"]
+    offsets: Annotated[np.ndarray, "r"]
+    desired: Annotated[np.ndarray, "r"]  # what each should be
+    weights: Annotated[np.ndarray, "r"]  # of the squared differences
+    weighted: Annotated[np.ndarray, "r", "n"]  # rows times weights
+    values: Annotated[np.ndarray, "r"]  # at the solution
     V: np.ndarray  # (nv, n) a view of `rows`; columns span the null space of J, or are 0
     B: np.ndarray  # (6, n) A V, a view
     E: np.ndarray  # (k, n) a view
@@ -53,31 +54,31 @@ class Workspace(Block):
     force_weights: np.ndarray  # (k,) a view
     torque_weights: np.ndarray  # (nj,) a view
     space: NullSpace
-    sole_accel: np.ndarray  # (6 nc,) a of the soles in the air; zero on the ground
-    contact_accel: np.ndarray  # (k,) that the contacts are to have: J v̇ + J̇ v less J̇ v
-    y: np.ndarray  # (6,)
-    cop_prev: np.ndarray  # (2,) last measured p
-    cop_vel: np.ndarray  # (2,) ṗ
-    momentum_rate: np.ndarray  # (6,) [Ṗ_des; L̇_des]
-    BBt: np.ndarray  # (6, 6)
-    JtE: np.ndarray  # (nv, n) Jᵀ E
-    local: np.ndarray  # (6, n) E of one sole, its own axes
-    local0: np.ndarray  # (6,) w₀ of one sole, its own axes
-    H: np.ndarray  # (n, n)
-    g: np.ndarray  # (n,)
-    C: np.ndarray  # (m, n)
-    l: np.ndarray  # noqa: E741  (m,)
-    u: np.ndarray  # (m,)
-    x: np.ndarray  # (n,)
-    lam: np.ndarray  # (m,)
-    scratch: np.ndarray
-    iscratch: np.ndarray
-    status: np.ndarray  # (1,) int: how the solution ended, see `solvers/scaled_rows.py`; 0: solved
+    sole_accel: Annotated[np.ndarray, "6nc"]  # a of the soles in the air; zero on the ground
+    contact_accel: Annotated[np.ndarray, "k"]  # that the contacts are to have: J v̇ + J̇ v less J̇ v
+    y: Annotated[np.ndarray, 6]
+    cop_prev: Annotated[np.ndarray, 2]  # last measured p
+    cop_vel: Annotated[np.ndarray, 2]  # ṗ
+    momentum_rate: Annotated[np.ndarray, 6]  # [Ṗ_des; L̇_des]
+    BBt: Annotated[np.ndarray, 6, 6]
+    JtE: Annotated[np.ndarray, "nv", "n"]  # Jᵀ E
+    local: Annotated[np.ndarray, 6, "n"]  # E of one sole, its own axes
+    local0: Annotated[np.ndarray, 6]  # w₀ of one sole, its own axes
+    H: Annotated[np.ndarray, "n", "n"]
+    g: Annotated[np.ndarray, "n"]
+    C: Annotated[np.ndarray, "m", "n"]
+    l: Annotated[np.ndarray, "m"]  # noqa: E741
+    u: Annotated[np.ndarray, "m"]
+    x: Annotated[np.ndarray, "n"]
+    lam: Annotated[np.ndarray, "m"]
+    scratch: Annotated[np.ndarray, "floats"]
+    iscratch: Annotated[np.ndarray, "ints", np.int64]
+    status: Integer  # how the solution ended, see `solvers/scaled_rows.py`; 0: solved
     vdot: np.ndarray  # (nv,) solution, a view of `values` like the next two
     wrenches: np.ndarray  # (k,) solution
     tau_asked: np.ndarray  # (nj,) solution, to rounding within the limits
-    tau: np.ndarray  # (nj,) solution, within the limits
-    root_wrench: np.ndarray  # (6,) solution, about the CoM; zero with a hard root
+    tau: Annotated[np.ndarray, "nj"]  # solution, within the limits
+    root_wrench: Annotated[np.ndarray, 6]  # solution, about the CoM; zero with a hard root
 
     @property
     def N(self) -> np.ndarray:
@@ -111,27 +112,25 @@ def allocate_workspace(
     first_torque = first_point + point_rows
     first_joint = first_torque + nj
     n, m = first_root + (6 if soft_root else 0), first_joint + nj + limit_rows
-    r, z = nv + 6 + k + nj, guarded_zeros
-    rows, offsets, desired, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
+    r = nv + 6 + k + nj
+    rows, offsets, desired, weights, values = (
+        guarded_zeros(shape) for shape in ((r, n), r, r, r, r)
+    )
     V, B, E, T = slice(nv), slice(nv, nv + 6), slice(nv + 6, r - nj), slice(r - nj, r)
     for i in range(3 * points):  # the forces of points are unknowns themselves
         rows[E][i - 3 * points, first_force + i] = 1.0
-    ws = Workspace(
-        first_internal=first_internal, first_force=first_force, first_root=first_root,
+    sizes = {"nv": nv, "nj": nj, "nc": nc, "k": k, "r": r, "n": n, "m": m}
+    sizes |= {"floats": scratch_size(n, m), "ints": iscratch_size(n, m)}
+    ws = Workspace.allocate(
+        sizes, first_internal=first_internal, first_force=first_force, first_root=first_root,
         first_point=first_point, first_torque=first_torque, first_joint=first_joint,
-        rows=rows, offsets=offsets, desired=desired, weights=weights,
-        weighted=z((r, n)), values=values, V=rows[V], B=rows[B], E=rows[E], T=rows[T],
+        rows=rows, offsets=offsets, desired=desired, weights=weights, values=values,
+        V=rows[V], B=rows[B], E=rows[E], T=rows[T],
         vdot0=offsets[V], W0=offsets[B], w0=offsets[E], tau0=offsets[T],
         accel_des=desired[V], wrench_des=desired[B], force_des=desired[E],
         accel_weights=weights[V], momentum_weights=weights[B], force_weights=weights[E],
         torque_weights=weights[T], space=space,
-        sole_accel=z(6 * nc),
-        contact_accel=z(k), y=z(6), cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6),
-        BBt=z((6, 6)), JtE=z((nv, n)), local=z((6, n)), local0=z(6),
-        H=z((n, n)), g=z(n), C=z((m, n)), l=z(m), u=z(m), x=z(n), lam=z(m),
-        scratch=z(scratch_size(n, m)), iscratch=z(iscratch_size(n, m), dtype=np.int64),
-        status=z(1, dtype=np.int64), vdot=values[V], wrenches=values[E], tau_asked=values[T],
-        tau=z(nj), root_wrench=z(6),
+        vdot=values[V], wrenches=values[E], tau_asked=values[T],
     )  # fmt: skip
     ws.cop_prev[:] = np.nan
     return ws

@@ -30,6 +30,10 @@ from numba.np import numpy_support
 from .copies import portable
 from .memory import guarded_zeros
 
+#: in a block: a number that compiled code writes, which is an array of one entry
+Number = Annotated[np.ndarray, 1]
+Integer = Annotated[np.ndarray, 1, np.int64]
+
 
 @dataclass(frozen=True, eq=False)
 class Block:

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from poise.baselines.balance.references.legs import nominal_feet
-from poise.baselines.balance.stepping.planning.cop_region import CopRegion
+from poise.baselines.balance.stepping.planning.cop_region import cop_region
 from poise.baselines.registry import controller_config
 from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.compiled.maths.polygons import half_planes
@@ -60,7 +60,7 @@ def turn_budget(simulation):
 
 def cop_rows(robot):
     """N, b with N p ≤ b: where both soles put p with the torques of their ankles [m]."""
-    return half_planes(CopRegion(robot, fraction=1.0).both(nominal_feet(robot), 0.0))
+    return half_planes(cop_region(robot, fraction=1.0).both(nominal_feet(robot), 0.0))
 
 
 def limit(simulation, start, direction, duration, lever, hip_torque):

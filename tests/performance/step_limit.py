@@ -33,7 +33,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
 from poise.baselines.balance.references.legs import nominal_feet
-from poise.baselines.balance.stepping.planning.cop_region import CopRegion
+from poise.baselines.balance.stepping.planning.cop_region import cop_region
 from poise.baselines.registry import controller_config
 from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.compiled.maths.polygons import half_planes
@@ -100,7 +100,7 @@ def measure(robot, given):
     """The `Body` of a robot."""
     simulation = Simulation(robot)
     mujoco.mj_forward(robot.model, simulation.data)
-    feet, region = nominal_feet(robot), CopRegion(robot, fraction=1.0)
+    feet, region = nominal_feet(robot), cop_region(robot, fraction=1.0)
     hip = robot.height_com  # of the pendulum's leg
     reach = []
     for foot in range(2):

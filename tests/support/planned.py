@@ -1,16 +1,52 @@
-"""What the kernels of `StepPlanner`, `CopRegion` and `Swing` find, as values."""
+"""What the kernels of `Search`, `CopRegion` and `Swing` find, as values."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from poise.baselines.balance.stepping.planner import StepPlanner
+from poise.baselines.balance.references.legs import foot_signs
+from poise.baselines.balance.stepping.controller import StepOffsets
 from poise.baselines.balance.stepping.planning.blocks import Search
-from poise.baselines.balance.stepping.planning.cop_region import CopRegion, distance_beyond
-from poise.baselines.balance.stepping.planning.search import plan_step, replan_step, set_foot
+from poise.baselines.balance.stepping.planning.config import (
+    PivotConfig,
+    StepFeedback,
+)
+from poise.baselines.balance.stepping.planning.cop_region import (
+    CopRegion,
+    cop_region,
+    distance_beyond,
+)
+from poise.baselines.balance.stepping.planning.feedback import feedback_arrays
+from poise.baselines.balance.stepping.planning.search import (
+    capture_foothold,
+    make_search,
+    plan_step,
+    replan_step,
+    set_foot,
+)
 from poise.baselines.balance.stepping.planning.swing import Swing, advance_over, aim_swing
 from poise.envs.compiled.maths.vectors import turn
 from poise.envs.physics.state import RobotState
+
+
+class Planner:
+    """What searches for steps are made of, for any state."""
+
+    def __init__(self, robot, limits, choice, feedback=None, falls=None, **rule):
+        self.robot, self.limits, self.choice, self.units = robot, limits, choice, robot.units
+        self.region, self.offsets = cop_region(robot), StepOffsets()
+        self.foot_sign = foot_signs(robot)
+        self.feedback = feedback_arrays(
+            robot, feedback or StepFeedback(), falls or {}, PivotConfig()
+        )
+        self.foothold_rule, self.further = rule.get("rule", capture_foothold), rule
+
+    def search(self, state: RobotState) -> Search:
+        """The search for steps from a state."""
+        return make_search(
+            self.robot, state.arrays, self.region, self.limits, self.choice, self.feedback,
+            self.offsets.values, **self.further,
+        )  # fmt: skip
 
 
 class StepPlan(NamedTuple):
@@ -23,24 +59,22 @@ class StepPlan(NamedTuple):
     time_offset: float = 0.0  #: part of the time that feedback and a policy added [s]
 
 
-def plan(planner: StepPlanner, state: RobotState, yaw: float) -> StepPlan:
+def plan(planner: Planner, state: RobotState, yaw: float) -> StepPlan:
     """The best step of either foot from where they stand."""
     search = _along(planner, state, yaw)
     plan_step(search)
     return _best(search)
 
 
-def replan(
-    planner: StepPlanner, state: RobotState, foot: int, yaw: float, swing: Swing
-) -> StepPlan:
+def replan(planner: Planner, state: RobotState, foot: int, yaw: float, swing: Swing) -> StepPlan:
     """The foothold and the time left of a running step."""
     search = _along(planner, state, yaw)
-    replan_step(search, foot, swing.arrays)
+    replan_step(search, foot, swing)
     return _best(search)
 
 
 def footholds(
-    planner: StepPlanner, state: RobotState, foot: int, yaw: float, times: np.ndarray,
+    planner: Planner, state: RobotState, foot: int, yaw: float, times: np.ndarray,
     start: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Footholds (n, 2) of steps of `foot` that land after `times` (n,) [s], and their costs [m]."""
@@ -69,22 +103,22 @@ def beyond(
     """
     rows = zip(*np.atleast_2d(*np.broadcast_arrays(first, second, xi)), strict=True)
     cos, sin = np.cos(yaw), np.sin(yaw)
-    return np.array([distance_beyond(region.arrays, *a, *b, cos, sin, *x) for a, b, x in rows])
+    return np.array([distance_beyond(region, *a, *b, cos, sin, *x) for a, b, x in rows])
 
 
 def aim(swing: Swing, foothold: np.ndarray, duration: float | None = None) -> None:
     """Lead to another `foothold` (2,), or at another time, see `aim_swing`."""
-    duration = swing.duration if duration is None else duration
-    aim_swing(swing.arrays, float(foothold[0]), float(foothold[1]), float(duration))
+    duration = swing.duration[0] if duration is None else duration
+    aim_swing(swing, float(foothold[0]), float(foothold[1]), float(duration))
 
 
 def advance(swing: Swing, dt: float) -> np.ndarray:
     """(3, 3) Position, velocity and acceleration [m, s] after `dt` more seconds."""
-    advance_over(swing.arrays, swing.arrays.apex, dt)
+    advance_over(swing, swing.apex, dt)
     return swing.reference.copy()
 
 
-def _along(planner: StepPlanner, state: RobotState, yaw: float) -> Search:
+def _along(planner: Planner, state: RobotState, yaw: float) -> Search:
     search = planner.search(state)
     search.heading[:] = np.cos(yaw), np.sin(yaw)
     return search

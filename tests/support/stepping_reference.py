@@ -9,6 +9,7 @@ from poise.baselines.balance.stepping.planning.cop_region import (
 )
 from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import LOADING, SHIFTING
+from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.envs.compiled.maths.polygons import nearest_inside
 from poise.envs.compiled.maths.vectors import turn
 from tests.support.planned import StepPlan, alone
@@ -39,16 +40,16 @@ def quintic(start, end, duration, t):
 
 def advanced(swing, dt):
     """(3, 3) what `planned.advance` should give."""
-    rest, speed, w = swing.remaining, swing.arrays.landing_speed, swing.arrays
+    rest, speed, w = time_left(swing), swing.landing_speed, swing
     reference, ground = swing.reference.T, float(w.ground[0])
     ways = []
     for now, place in zip(reference[:2], swing.foothold, strict=True):
         end = np.array([place, 0.0, 0.0])
         ways.append(quintic(now, end, rest, dt) if rest > dt else end)
-    lift = w.lift * swing.duration
-    if swing.time + dt < lift:
+    lift = w.lift * swing.duration[0]
+    if swing.time[0] + dt < lift:
         apex = [ground + w.apex, 0.0, 0.0]
-        ways.append(quintic(reference[2], apex, lift - swing.time, dt))
+        ways.append(quintic(reference[2], apex, lift - swing.time[0], dt))
     elif rest > dt:
         ways.append(quintic(reference[2], [ground, -speed, 0.0], rest, dt))
     else:
@@ -81,7 +82,7 @@ def beyond(region, first, second, yaw, xi):
     ways, worst = DIRECTIONS @ turn(yaw).T, -np.inf
     for d, way in enumerate(ways):
         ends = [
-            region.arrays.support[k, d] + share * (first @ way) + (1.0 - share) * (second @ way)
+            region.support[k, d] + share * (first @ way) + (1.0 - share) * (second @ way)
             for k, share in enumerate(LOAD_FRACTIONS)
         ]
         worst = max(worst, xi @ way - max(ends))
@@ -89,7 +90,7 @@ def beyond(region, first, second, yaw, xi):
 
 
 class ReadablePlanner:
-    """`StepPlanner` with the law of the capture point."""
+    """`planned.Planner` with the law of the capture point."""
 
     def __init__(self, planner):
         self.planner, self.region, self.offsets = planner, planner.region, planner.offsets
@@ -133,10 +134,10 @@ class ReadablePlanner:
     def replan(self, state, foot, yaw, swing):
         """The best time and place of a running step."""
         rate = self.omega
-        self.phase = swing.time / swing.duration
-        low = max(self.limits.time_min / rate - swing.time, FROZEN)
-        high = max(self.limits.time_max / rate - swing.time, low)
-        left = max(swing.remaining - swing.arrays.time_offset[0], FROZEN)
+        self.phase = swing.time[0] / swing.duration[0]
+        low = max(self.limits.time_min / rate - swing.time[0], FROZEN)
+        high = max(self.limits.time_max / rate - swing.time[0], low)
+        left = max(time_left(swing) - swing.time_offset[0], FROZEN)
         times = np.append(np.linspace(low, high, 8), left)
         start = swing.reference[0, :2] + 0.5 * swing.reference[1, :2] * min(left, 0.1)
         best = self.best(state, foot, yaw, times, start, 0.02 * np.abs(times - left))
@@ -200,13 +201,13 @@ def lean_matrix(lean):
 def guided(controller, state, targets, region, overreach, ground, stride, raised):
     """What `copy_reference` and `guide_com` should put into the targets, by name; `raised` is fed
     back."""
-    c, h, offsets = controller.config, controller.planner.units.height, controller.offsets
-    level, rate2 = controller.memory.level_frame, controller.planner.units.omega**2
+    c, h, offsets = controller.config, controller.robot.units.height, controller.offsets
+    level, rate2 = controller.memory.level_frame, controller.robot.units.omega**2
     R, xi, p = level[:2, :2], state.capture_point, controller.sets.parameters
     r = controller.recentring
     rest = region.mean(axis=0)
     if controller.swing is None:
-        rest = rest + R @ [rest_ahead(controller.region), 0.0]
+        rest = rest + R @ [rest_ahead(controller.robot, controller.region), 0.0]
     if r.stage[0] == SHIFTING:
         rest = r.capture_target
     wanted = xi + c.gain * (xi - rest - R @ offsets.com)

@@ -1,6 +1,7 @@
 """Targets of one tick from a reference motion and a residual, compiled."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -8,7 +9,6 @@ from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into, rotated
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -45,7 +45,7 @@ class Motion(Block):
     knots: np.ndarray
     coeffs: np.ndarray
     loop: bool
-    samples: np.ndarray  # (3, nj + 6) scratch: position, velocity and acceleration
+    samples: Annotated[np.ndarray, 3, "nj+6"]  # scratch: position, velocity and acceleration
     pace: Pace
 
 
@@ -53,9 +53,10 @@ def motion_arrays(
     motion: ReferenceMotion, tempo: Tempo | None = None, height: float = 1.0
 ) -> Motion:
     """The block of `motion`, with scratch and a memory of its own; `height` is h [m]."""
-    samples = guarded_zeros((3, motion.coeffs.shape[2]))
-    pace = make_pace(tempo or Tempo(), height)
-    return Motion(motion.knots, motion.coeffs, motion.loop, samples, pace)
+    return Motion.allocate(
+        {"nj": motion.coeffs.shape[2] - 6}, knots=motion.knots, coeffs=motion.coeffs,
+        loop=motion.loop, pace=make_pace(tempo or Tempo(), height),
+    )  # fmt: skip
 
 
 @compiled

@@ -1,13 +1,12 @@
 """How fast a motion's time runs: it may wait while the robot catches itself."""
 
 from dataclasses import asdict, dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 
 AFTER = ("resume", "catch-up", "restart")
@@ -58,7 +57,7 @@ class Pace(Block):
     least: float
     after: int  # index of `AFTER`
     fastest: float
-    memory: np.ndarray  # (5,) TIME, RATE, CHANGE, CLOCK, BACK
+    memory: Annotated[np.ndarray, 5]  # TIME, RATE, CHANGE, CLOCK, BACK
 
     def clear(self) -> None:
         """Begin the motion."""
@@ -69,7 +68,7 @@ class Pace(Block):
 def make_pace(tempo: Tempo, height: float) -> Pace:
     """The pace of a motion that has not begun; `height` [m] is h."""
     own = {"distance": tempo.distance * height, "after": AFTER.index(tempo.after)}
-    pace = Pace(**(asdict(tempo) | own), memory=guarded_zeros(5))
+    pace = Pace.allocate(**(asdict(tempo) | own))
     pace.clear()
     return pace
 

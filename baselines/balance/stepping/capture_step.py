@@ -18,16 +18,18 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import NO_KERNEL, Kernel, address_of
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .controller import STANDING, Stepping, SteppingController
-from .planner import StepPlanner
-from .planning.blocks import CaptureTick, RegionArrays, StepGains, StepMemory, zeros
+from .controller import STANDING, StepOffsets, Stepping, SteppingController
+from .planning.blocks import CaptureTick, Search, StepGains, StepMemory
 from .planning.config import CaptureStepConfig, StepLimits
-from .planning.cop_region import CopRegion, rest_ahead
+from .planning.cop_region import CopRegion, cop_region, rest_ahead
+from .planning.feedback import feedback_arrays
 from .planning.recentring import recentring_arrays, stop_recentring
-from .planning.swing import Swing, swing_gains, swing_task
+from .planning.search import capture_foothold, make_search
+from .planning.swing import Swing, bind_swings, swing_at, time_left
 from .planning.swing_speed import possible_limits
 from .planning.units import in_si
 from .tick import capture_tick
@@ -72,14 +74,10 @@ def step_gains(
     return StepGains(**numbers, rest_ahead=rest_ahead, period=period)
 
 
-def allocate_step_memory(region: RegionArrays) -> StepMemory:
+def allocate_step_memory(region: CopRegion) -> StepMemory:
     """The memory of a controller that has not stepped."""
     corners = region.sums.shape[0] * region.sums.shape[1]
-    return StepMemory(
-        **zeros(np.int64, steps=1, recovering=1, foot=1, swinging=1, corners=1, moved=1),
-        **zeros(level_frame=(3, 3), region=(2 * corners + 1, 2)),
-        **zeros(clock=1, load=1, load_fraction=1, return_fraction=1),
-    )
+    return StepMemory.allocate({"n": corners})
 
 
 class CaptureStep(AroundQP, CompiledController, SteppingController):
@@ -90,11 +88,14 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     c̈ = ω² (c − p), p = ξ + k (ξ − ξ_ref) at most at the edge of the soles in contact [Koolen12,
     Englsberger11], and the foothold follows ξ. Steps stay within what the legs' motors can do; a
     robot whose feet could not be down again in time never steps. The ticks are those of `tick.py`;
-    they are bound to `config` and `planner` when they are made. Raises ConfigError unless there are
+    they are bound to `config` when they are made. Raises ConfigError unless there are
     two soles, and both QPs have a hard root and one period.
     """
 
     kernel: Callable[[Any], None] = staticmethod(capture_tick)  #: that a tick of steps runs
+    #: finds the foothold of a foot and time
+    foothold_rule: Callable[[Search], None] = staticmethod(capture_foothold)
+    _arc = 0.0  # that `foothold_rule` may use
 
     def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
         if len(robot.soles) != 2:
@@ -106,15 +107,14 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         check_qps(self.config)
         super().__init__(robot, self.config.qp)
         self.sets = ContactSets(robot, self.config.step_qp, self.config.torque_rate_limit)
-        self.region = CopRegion(robot, self.config.region_fraction)
+        self.region = cop_region(robot, self.config.region_fraction)
         c = self.config
-        limits = possible_limits(robot, c.limits, c.swing, c.step_qp.torque.share)
-        self.steps_possible = limits is not None
-        self.planner = self._planner(self.region, limits or c.limits)
-        self.offsets = self.planner.offsets  #: what a policy adds
-        self._swing = Swing(np.zeros(3), 0.0, self.config.swing, robot.units)
+        self._step_limits = possible_limits(robot, c.limits, c.swing, c.step_qp.torque.share)
+        self.offsets = StepOffsets()  #: what a policy adds
+        self._feedback = feedback_arrays(robot, c.feedback, c.falls, c.pivot)
+        self._swing = swing_at(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)
-        self.memory = allocate_step_memory(self.region.arrays)
+        self.memory = allocate_step_memory(self.region)
         #: (nv−6,) of the last tick [N·m]
         self.tau = guarded_zeros(len(self.qp.parameters.torque_limit))
         self._vdot = guarded_zeros(robot.model.nv)
@@ -123,10 +123,6 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self._reference_out: Targets | None = None
         self._tick: CaptureTick | None = None
         self.reset()
-
-    def _planner(self, region: CopRegion, limits: StepLimits) -> StepPlanner:
-        c = self.config
-        return StepPlanner(self.robot, region, limits, c.foothold, c.feedback, c.falls, c.pivot)
 
     @property
     def failures(self) -> int:
@@ -152,7 +148,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     @property
     def step_limits(self) -> StepLimits | None:
         """See `SteppingController`; None where the legs are too slow for any step."""
-        return self.planner.limits if self.steps_possible else None
+        return self._step_limits
 
     @property
     def compiled(self) -> bool:
@@ -198,7 +194,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
 
     @property
     def swing(self) -> Swing | None:
-        """The swing in progress, or None when both feet are down."""
+        """The swing in progress, or None when both feet are down; ticks write into it."""
         return self._swing if self.memory.swinging[0] else None
 
     def stepping(self) -> Stepping:
@@ -207,8 +203,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         if swing is None:
             return STANDING._replace(steps=self.steps, since=float(self.memory.clock[0]))
         point, foothold = swing.reference[0].copy(), swing.foothold.copy()
-        phase = swing.time / swing.duration
-        return Stepping(self.steps, self.foot, point, foothold, phase, swing.remaining, 0.0)
+        phase = float(swing.time[0]) / float(swing.duration[0])
+        return Stepping(self.steps, self.foot, point, foothold, phase, time_left(swing), 0.0)
 
     def tick(self, state: RobotState, targets: Targets) -> CaptureTick:
         """The block that `capture_tick` works on."""
@@ -230,42 +226,46 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         """`tick`, but for the addresses of the kernels that it calls."""
         if self._reference_out is None:
             self._reference_out = Targets.standing(self.robot, state)
-        s, asked, sets = state.arrays, self._reference_out.arrays(), self.sets
-        region = self.region.arrays
-        gains = swing_gains(self.qp.arrays, self.config.swing)
-        way, axes = self._swing.reference, self.memory.level_frame
-        on_first, on_second, on_both = (
-            sets.sets[soles].bind(
-                s, asked, sets, [swing_task(foot, way, axes, gains) for foot in swinging]
-            )
-            for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
+        s, asked, region = state.arrays, self._reference_out.arrays(), self.region
+        ticks = bind_swings(
+            self.sets, s, asked, self.config.swing, self._swing.reference, self.memory.level_frame
         )
-        return CaptureTick(
+        return CaptureTick.allocate(
+            {"k": region.alone.shape[1], "n": len(self.memory.region) // 2},
             robot=self.qp.arrays,
             state=s,
             reference_in=targets.arrays(),
             reference_out=asked,
             gains=step_gains(
-                self.robot, self.config, self.period, rest_ahead(self.region), self.steps_possible
+                self.robot,
+                self.config,
+                self.period,
+                rest_ahead(self.robot, region),
+                self._step_limits is not None,
             ),
-            search=self.planner.search(state),
-            swing=self._swing.arrays,
+            search=self._search(s),
+            swing=self._swing,
             memory=self.memory,
             recentring=self.recentring,
             offsets=self.offsets.values,
-            on_first=on_first,
-            on_second=on_second,
-            on_both=on_both,
+            **ticks,
             standing=self.qp.tick(state, targets),
             tau=self.tau,
             vdot=self._vdot,
             failures=self._failures,
-            **zeros(np.int64, to_python=1),
-            **zeros(corners=region.alone.shape[1:], cloud=(len(self.memory.region) // 2, 2)),
-            **zeros(pair=2, vector=3),
             standing_kernel=NO_KERNEL,
             contact_kernel=NO_KERNEL,
         )
+
+    def _search(self, s: StateArrays) -> Search:
+        """The search for steps from a state, the same one as long as the state is."""
+        known, c = self._tick, self.config
+        if known is not None and known.state is s:
+            return known.search
+        return make_search(
+            self.robot, s, self.region, self._step_limits or c.limits, c.foothold, self._feedback,
+            self.offsets.values, self.foothold_rule, self._arc,
+        )  # fmt: skip
 
     def block(self, state: RobotState, targets: Targets) -> Block:
         """The block that `kernel` works on."""

@@ -7,10 +7,8 @@ from poise.envs.compiled.maths.pendulum import pendulum
 from poise.envs.robots.robot import Robot
 
 from .capture_step import CaptureStep
-from .planner import StepPlanner
 from .planning.blocks import Search
-from .planning.config import IPMStepConfig, StepLimits
-from .planning.cop_region import CopRegion
+from .planning.config import IPMStepConfig
 from .planning.search import clip_to_limits, to_step_frame, to_world, with_offsets
 
 
@@ -28,7 +26,7 @@ def rest_distance(speed: float, omega: float, height: float, arc: float) -> floa
 
 @compiled
 def energy_foothold(q: Search) -> None:
-    """The foothold over which the pendulum stands still and its cost, see `EnergyPlanner`."""
+    """The foothold over which the pendulum stands still and its cost, see `IPMStep`."""
     s, foot, omega, t = q.state, q.foot[0], q.state.omega[0], q.time[0]
     x, vx = pendulum(s.com[0], s.com_vel[0], q.cop[0], omega, t)
     y, vy = pendulum(s.com[1], s.com_vel[1], q.cop[1], omega, t)
@@ -43,32 +41,21 @@ def energy_foothold(q: Search) -> None:
     q.cost[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
 
 
-class EnergyPlanner(StepPlanner):
-    """Plans the foothold over which the pendulum stands still, from where it is at touchdown.
+class IPMStep(CaptureStep):
+    """`capture-step` with footholds by energy [Notes, lecture 11], the step time given.
 
-    Until then the CoP is taken to stay at p, where the stance sole brakes most; the cost is how
-    far limits keep the foothold from the one desired [m].
+    Each is where the pendulum stands still, from where it is at touchdown. Until then the CoP is
+    taken to stay at p, where the stance sole brakes most; the cost is how far limits keep the
+    foothold from the one desired [m]. Feet in place, the trigger of a step, the swing, and balance
+    on one foot and after are those of `capture-step`. Raises ConfigError unless there are two
+    soles.
     """
 
     foothold_rule = staticmethod(energy_foothold)
 
-
-class IPMStep(CaptureStep):
-    """`capture-step` with footholds by energy [Notes, lecture 11], the step time given.
-
-    Feet in place, the trigger of a step, the swing, and balance on one foot and after are those
-    of `capture-step`. Raises ConfigError unless there are two soles.
-    """
-
     def __init__(self, robot: Robot, config: IPMStepConfig | None = None):
-        super().__init__(robot, config or IPMStepConfig())
-
-    def _planner(self, region: CopRegion, limits: StepLimits) -> StepPlanner:
-        config = self.config
+        config = config or IPMStepConfig()
         if not isinstance(config, IPMStepConfig):
             raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
-        return EnergyPlanner(
-            self.robot, region, limits, config.foothold, config.feedback, config.falls,
-            config.pivot,
-            arc=config.arc,
-        )  # fmt: skip
+        self._arc = config.arc
+        super().__init__(robot, config)

@@ -1,6 +1,7 @@
-"""The blocks that the kernels of this room work on; SI units, arrays of one entry are numbers."""
+"""The blocks that the kernels of this room work on; in SI units."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -8,9 +9,8 @@ from poise.baselines.balance.references.footing import COLUMNS, Footing
 from poise.baselines.balance.references.tempo import Pace
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick
 from poise.baselines.controller import TargetArrays
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer, Number
 from poise.envs.compiled.maths.pendulum import Units
-from poise.envs.compiled.memory import guarded_zeros
 
 from .config import PerformConfig
 
@@ -27,7 +27,7 @@ class Performance(Block):
     switches: np.ndarray
     planted: np.ndarray
     pace: Pace  # of the motion's time, where it waits
-    samples: np.ndarray  # (3, 20) of the tick: position, velocity and acceleration, in the world
+    samples: Annotated[np.ndarray, 3, COLUMNS]  # position, velocity, acceleration, in the world
     gain: float
     margin: float  # [m]
     margin_both: float  # [m]
@@ -36,13 +36,13 @@ class Performance(Block):
     load_time: float  # [s]
     unload_time: float  # [s]
     landing_speed: float  # [m/s] of a foot that is late
-    clock: np.ndarray  # (1,) since the reset [s]
-    performing: np.ndarray  # (1,) int: 1 while it follows the schedule; 0: it catches itself
-    begun: np.ndarray  # (1,) int: the phase whose foot lifted off last; 0: none did
-    flying: np.ndarray  # (1,) int: 1 while both feet are in the air
-    rested: np.ndarray  # (1,) since both feet are down and the motion is left [s]
-    left: np.ndarray  # (1,) int: how often the planner of steps took over
-    frame: np.ndarray  # (5,) see X to SIN
+    clock: Number  # since the reset [s]
+    performing: Integer  # 1 while it follows the schedule; 0: it catches itself
+    begun: Integer  # the phase whose foot lifted off last; 0: none did
+    flying: Integer  # 1 while both feet are in the air
+    rested: Number  # since both feet are down and the motion is left [s]
+    left: Integer  # how often the planner of steps took over
+    frame: Annotated[np.ndarray, 5]  # see X to SIN
 
     def clear(self) -> None:
         """Before the motion begins."""
@@ -55,10 +55,10 @@ def allocate_performance(
     footing: Footing, pace: Pace, config: PerformConfig, units: Units, landing_speed: float
 ) -> Performance:
     """The performance of a motion by a robot with these units, before it begins."""
-    c, h, omega, whole = config, units.height, units.omega, np.int64
-    made = Performance(
-        footing.knots, footing.coeffs, footing.switches, footing.planted, pace,
-        samples=guarded_zeros((3, COLUMNS)),
+    c, h, omega = config, units.height, units.omega
+    made = Performance.allocate(
+        knots=footing.knots, coeffs=footing.coeffs, switches=footing.switches,
+        planted=footing.planted, pace=pace,
         gain=float(c.gain),
         margin=c.margin * h,
         margin_both=c.margin_both * h,
@@ -67,13 +67,6 @@ def allocate_performance(
         load_time=c.load_time / omega,
         unload_time=c.unload_time / omega,
         landing_speed=landing_speed * h * omega,
-        clock=guarded_zeros(1),
-        performing=guarded_zeros(1, whole),
-        begun=guarded_zeros(1, whole),
-        flying=guarded_zeros(1, whole),
-        rested=guarded_zeros(1),
-        left=guarded_zeros(1, whole),
-        frame=guarded_zeros(5),
     )  # fmt: skip
     made.clear()
     return made

@@ -9,7 +9,7 @@ from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.tempo import Pace
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick
-from poise.baselines.balance.stepping.planning.swing import swing_gains, swing_task
+from poise.baselines.balance.stepping.planning.swing import bind_swings
 from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
@@ -93,14 +93,9 @@ class MotionStep(CaptureStep):
     def _of_performance(self, capture: CaptureTick) -> CaptureTick:
         """A block with the same memory, and the QPs of the performance."""
         c, omega = self._perform_config, self.robot.units.omega
-        task = swing_gains(self.qp.arrays, c.swing)
-        asked, way = capture.reference_out, self._swing.reference
-        on_first, on_second, on_both = (
-            self.perform_sets.sets[soles].bind(
-                capture.state, asked, self.perform_sets,
-                [swing_task(foot, way, self._axes, task) for foot in swinging],
-            )
-            for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
+        ticks = bind_swings(
+            self.perform_sets, capture.state, capture.reference_out, c.swing,
+            self._swing.reference, self._axes,
         )  # fmt: skip
         gains = replace(
             capture.gains,
@@ -108,9 +103,7 @@ class MotionStep(CaptureStep):
             swing_accel=c.swing_accel * omega**2,
             joint_accel=c.joint_accel * omega**2,
         )
-        return replace(
-            capture, gains=gains, on_first=on_first, on_second=on_second, on_both=on_both
-        )  # fmt: skip
+        return replace(capture, gains=gains, **ticks)
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
         if self.performance is None:

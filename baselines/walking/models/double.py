@@ -20,14 +20,13 @@ between the least and the largest flexion.
 """
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 
@@ -60,7 +59,7 @@ class DoubleTick(Block):
     least: float  # β [rad]
     most: float  # [rad]
     seed_form: bool
-    flexion: np.ndarray  # (2, 3) β, β̇, β̈ of each leg's reference [rad, s]
+    flexion: Annotated[np.ndarray, 2, 3]  # β, β̇, β̈ of each leg's reference [rad, s]
 
 
 @compiled
@@ -192,10 +191,9 @@ class Double(ReferenceModel):
 
     def bind(self, robot: Robot, state: StateArrays, reference: Reference) -> Program:
         """Both legs of this robot."""
-        tick = DoubleTick(
+        tick = DoubleTick.allocate(
             state=state, reference=reference, rows=row_gains(self.rows, robot.units),
             rate=self.rate * robot.units.omega, least=float(np.radians(self.least_flexion)),
             most=float(np.radians(self.most_flexion)), seed_form=self.seed_form,
-            flexion=guarded_zeros((2, 3)),
         )  # fmt: skip
         return Program.of([(double_tick, tick)])

@@ -2,6 +2,7 @@
 joints are above and below a knee."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import mujoco
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.legs import find_legs, standing_data
 from poise.envs.robots.robot import Robot
@@ -21,20 +21,20 @@ class LegArrays(Block):
 
     thigh: float  # L1, from hip to knee [m]
     shank: float  # L2, from knee to ankle [m]
-    hip_body: np.ndarray  # (2,) int: a body that the hip is fixed to
-    hip_place: np.ndarray  # (2, 3) the hip in that body's axes [m]
-    ankle_body: np.ndarray  # (2,) int
-    ankle_place: np.ndarray  # (2, 3) [m]
-    knee_dof: np.ndarray  # (2,) int
-    knee_sign: np.ndarray  # (2,) 1 where the joint's angle rises with the flexion, else −1
-    straight: np.ndarray  # (2,) the joint's angle of a straight leg [rad]
-    hip_dof: np.ndarray  # (2,) int: of the joint that turns about the robot's left
-    hip_sign: np.ndarray  # (2,) 1 where its angle rises as the thigh turns forward, else −1
-    hip: np.ndarray  # (2, 3) world [m]
-    ankle: np.ndarray  # (2, 3) world [m]
-    sole: np.ndarray  # (2, 2) reference points of the soles, along the ground [m]
-    flexion: np.ndarray  # (2,) β [rad]
-    flexion_rate: np.ndarray  # (2,) β̇ [rad/s]
+    hip_body: Annotated[np.ndarray, 2, np.int64]  # a body that the hip is fixed to
+    hip_place: Annotated[np.ndarray, 2, 3]  # the hip in that body's axes [m]
+    ankle_body: Annotated[np.ndarray, 2, np.int64]
+    ankle_place: Annotated[np.ndarray, 2, 3]  # [m]
+    knee_dof: Annotated[np.ndarray, 2, np.int64]
+    knee_sign: Annotated[np.ndarray, 2]  # 1 where the joint's angle rises with the flexion, else −1
+    straight: Annotated[np.ndarray, 2]  # the joint's angle of a straight leg [rad]
+    hip_dof: Annotated[np.ndarray, 2, np.int64]  # of the joint that turns about the robot's left
+    hip_sign: Annotated[np.ndarray, 2]  # 1 where it rises as the thigh turns forward, else −1
+    hip: Annotated[np.ndarray, 2, 3]  # world [m]
+    ankle: Annotated[np.ndarray, 2, 3]  # world [m]
+    sole: Annotated[np.ndarray, 2, 2]  # reference points of the soles, along the ground [m]
+    flexion: Annotated[np.ndarray, 2]  # β [rad]
+    flexion_rate: Annotated[np.ndarray, 2]  # β̇ [rad/s]
 
 
 @compiled
@@ -77,15 +77,13 @@ def leg_arrays(robot: Robot) -> LegArrays:
     bend = np.radians([float(leg.knee_bend or 0.0) for leg in legs])
     turns = np.sign(data.xaxis[hips, 1])
     carriers = [np.array([_carrier(model, joint) for joint in each]) for each in (hips, ankles)]
-    return LegArrays(
+    return LegArrays.allocate(
         thigh=float(rods[0].mean()), shank=float(rods[1].mean()),
         hip_body=carriers[0], hip_place=_in_bodies(data, carriers[0], places[0]),
         ankle_body=carriers[1], ankle_place=_in_bodies(data, carriers[1], places[2]),
         knee_dof=dofs.astype(np.int64), knee_sign=signs,
         straight=robot.standing_qpos[model.jnt_qposadr[knees]] - signs * bend,
         hip_dof=model.jnt_dofadr[hips].astype(np.int64), hip_sign=-turns,
-        hip=guarded_zeros((2, 3)), ankle=guarded_zeros((2, 3)),
-        sole=guarded_zeros((2, 2)), flexion=guarded_zeros(2), flexion_rate=guarded_zeros(2),
     )  # fmt: skip
 
 
@@ -103,13 +101,7 @@ def _in_bodies(data: mujoco.MjData, bodies: np.ndarray, places: np.ndarray) -> n
 
 def no_legs() -> LegArrays:
     """Legs that nothing is known of, for models that do not ask."""
-    none = np.zeros(2, np.int64)
-    return LegArrays(
-        thigh=0.0, shank=0.0, hip_body=none, hip_place=np.zeros((2, 3)), ankle_body=none,
-        ankle_place=np.zeros((2, 3)), knee_dof=none, knee_sign=np.ones(2), straight=np.zeros(2),
-        hip_dof=none, hip_sign=np.ones(2), hip=np.zeros((2, 3)), ankle=np.zeros((2, 3)),
-        sole=np.zeros((2, 2)), flexion=np.zeros(2), flexion_rate=np.zeros(2),
-    )  # fmt: skip
+    return LegArrays.allocate(thigh=0.0, shank=0.0, knee_sign=np.ones(2), hip_sign=np.ones(2))
 
 
 def _sign(model: mujoco.MjModel, data: mujoco.MjData, joints: tuple[int, int, int]) -> float:

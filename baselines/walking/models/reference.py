@@ -7,18 +7,17 @@ derivatives are continuous. The hip moves as the CoM does.
 """
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from poise.baselines.whole_body.tasks.task import BoundTask, Rows, Task, TaskTick
 from poise.configs.kinds import OfKind
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer, Number
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.easing import eased
 from poise.envs.compiled.maths.pendulum import Units
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -34,17 +33,19 @@ class Reference(Block):
     mass: float  # m [kg]
     gravity: float  # g [m/s²]
     period: float  # of a tick [s]
-    begun: np.ndarray  # (1,) int: 0 in the first tick of a walk
-    share: np.ndarray  # (3, 2) of the load that each leg is to bear, and its rates [s]
-    com_vel: np.ndarray  # (2,) horizontal [m/s]
-    com_acc: np.ndarray  # (2,) horizontal, asked for [m/s²]
-    cop: np.ndarray  # (2,) asked for [m]
-    ahead: np.ndarray  # (2,) unit vector of the heading
-    time_left: np.ndarray  # (1,) until touchdown, or until the foot behind leaves [s]
-    landing: np.ndarray  # (2,) the swinging sole's foothold [m]
-    height: np.ndarray  # (3,) answer: by how much the CoM is to be higher [m], ż and z̈ [m, s]
-    knee: np.ndarray  # (2, 2) answer: accelerations of the flexions [rad/s²], weights
-    hip: np.ndarray  # (2, 2) answer: forward accelerations of the thighs [rad/s²], weights
+    begun: Integer  # 0 in the first tick of a walk
+    share: Annotated[np.ndarray, 3, 2]  # of the load that each leg is to bear, and its rates [s]
+    com_vel: Annotated[np.ndarray, 2]  # horizontal [m/s]
+    com_acc: Annotated[np.ndarray, 2]  # horizontal, asked for [m/s²]
+    cop: Annotated[np.ndarray, 2]  # asked for [m]
+    ahead: Annotated[np.ndarray, 2]  # unit vector of the heading
+    time_left: Number  # until touchdown, or until the foot behind leaves [s]
+    landing: Annotated[np.ndarray, 2]  # the swinging sole's foothold [m]
+    # answers: by how much the CoM is to be higher [m], ż and z̈ [m, s]; accelerations of the
+    # flexions, forward ones of the thighs [rad/s²], and their weights
+    height: Annotated[np.ndarray, 3]
+    knee: Annotated[np.ndarray, 2, 2]
+    hip: Annotated[np.ndarray, 2, 2]
 
 
 @dataclass(frozen=True)
@@ -95,15 +96,9 @@ def row_gains(weights: RowWeights, units: Units) -> RowGains:
 
 def allocate_reference(robot: Robot, period: float, legs: LegArrays) -> Reference:
     """The reference of a robot that has not walked."""
-    sizes: dict[str, Any] = {
-        "share": (3, 2), "com_vel": 2, "com_acc": 2, "cop": 2, "ahead": 2, "time_left": 1,
-        "landing": 2, "height": 3, "knee": (2, 2), "hip": (2, 2),
-    }  # fmt: skip
-    return Reference(
-        legs=legs, mass=float(robot.mass), gravity=float(robot.units.gravity),
-        period=period, begun=guarded_zeros(1, np.int64),
-        **{name: guarded_zeros(size) for name, size in sizes.items()},
-    )  # fmt: skip
+    return Reference.allocate(
+        legs=legs, mass=float(robot.mass), gravity=float(robot.units.gravity), period=period
+    )
 
 
 @compiled

@@ -1,14 +1,13 @@
 """The spring-loaded inverted pendulum: each leg that bears the robot is a spring."""
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 
@@ -36,7 +35,7 @@ class SpringTick(Block):
     stiffness: float  # k/m [1/s²]
     damping: float  # d/m [1/s]
     length: float  # ℓ₀ [m]
-    height: np.ndarray  # (3,) z, ż, z̈ of the model's hip [m, s]
+    height: Annotated[np.ndarray, 3]  # z, ż, z̈ of the model's hip [m, s]
 
 
 @compiled
@@ -128,9 +127,8 @@ class Spring(ReferenceModel):
         legs = reference.legs
         length = float(length_at(legs.thigh, legs.shank, np.radians(self.flexion)))
         stiffness = self.stiffness * robot.units.gravity / length
-        tick = SpringTick(
-            state=state, reference=reference, rows=row_gains(self.rows, robot.units),
+        tick = SpringTick.allocate(
+            state=state, reference=reference, rows=row_gains(self.rows, robot.units), length=length,
             stiffness=stiffness, damping=2.0 * self.damping_ratio * float(np.sqrt(stiffness)),
-            length=length, height=guarded_zeros(3),
         )  # fmt: skip
         return Program.of([(spring_tick, tick)])

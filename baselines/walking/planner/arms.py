@@ -49,13 +49,10 @@ def allocate_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Ar
     and `weight` the one of joints that swing, in 1/ω⁴."""
     scales, swung = arm_scales(robot), posture_weight.copy()
     swung[6:][np.any(scales != 0.0, axis=0)] = weight / robot.units.omega**4
-    return Arms(
-        scales=scales,
-        weight=swung,
-        free_weight=posture_weight.copy(),
+    return Arms.allocate(
+        scales=scales, weight=swung, free_weight=posture_weight.copy(),
         least_step=LEAST_STEP * robot.units.height,
-        swinging=guarded_zeros(1, dtype=np.int64),
-    )
+    )  # fmt: skip
 
 
 def largest_swing(robot: Robot) -> float:

@@ -1,13 +1,17 @@
-"""The blocks that the kernels of walking work on; SI units, arrays of one entry are numbers."""
+"""The blocks that the kernels of walking work on; in SI units."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from poise.baselines.balance.stepping.planning.blocks import CaptureTick, StepMemory, SwingArrays
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick, StepMemory
+from poise.baselines.balance.stepping.planning.swing import Swing
 from poise.baselines.walking.models.reference import Reference
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer, Number
 from poise.envs.compiled.calls import Program
+
+from .command import ENTRIES
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +30,11 @@ class Treads(Block):
     arrive: float
     lean: float  # [rad/m]
     lean_from: float  # [m]
-    leaning: np.ndarray  # (1,) of the trunk ahead, now [rad]
-    left: np.ndarray  # (3,) where the swinging foot lifted off [m]
-    aim: np.ndarray  # (1,) int: the surface that the step goes to
-    target: np.ndarray  # (1,) height of the foothold that is being weighed [m]
-    room: np.ndarray  # (2,) scratch: from a sole's point back to its heel, on to its toes [m]
+    leaning: Number  # of the trunk ahead, now [rad]
+    left: Annotated[np.ndarray, 3]  # where the swinging foot lifted off [m]
+    aim: Integer  # the surface that the step goes to
+    target: Number  # height of the foothold that is being weighed [m]
+    room: Annotated[np.ndarray, 2]  # scratch: from a sole's point to its heel and its toes [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,17 +56,17 @@ class Gait(Block):
     speed_margin: float  # [m/s]
     time_min: float  # of a step, whatever the command says [s]
     lower: float  # from when a swinging foot comes down [of the swing]; 0: once it is up
-    command: np.ndarray  # (8,) see `GaitCommand.array`
-    velocity: np.ndarray  # (3,) ahead, left, turn, which follow the command
-    error: np.ndarray  # (2,) what the sum of the velocity's errors adds to it [m/s]
-    planned: np.ndarray  # (2,) the velocity with it [m/s]
-    yaw: np.ndarray  # (1,) of the heading [rad]
-    walking: np.ndarray  # (1,) int: 1 from the first shift of weight until the walk has stopped
-    starting: np.ndarray  # (1,) int: 1 until the first foot lifts off
-    clock: np.ndarray  # (1,) since both feet are down [s]
-    cop: np.ndarray  # (2,) that was asked for last on one foot [m]
-    middle: np.ndarray  # (2,) between the soles at the last touchdown [m]
-    step_clock: np.ndarray  # (1,) since then [s]; < 0: there was none
+    command: Annotated[np.ndarray, ENTRIES]  # see `GaitCommand.array`
+    velocity: Annotated[np.ndarray, 3]  # ahead, left, turn, which follow the command
+    error: Annotated[np.ndarray, 2]  # what the sum of the velocity's errors adds to it [m/s]
+    planned: Annotated[np.ndarray, 2]  # the velocity with it [m/s]
+    yaw: Number  # of the heading [rad]
+    walking: Integer  # 1 from the first shift of weight until the walk has stopped
+    starting: Integer  # 1 until the first foot lifts off
+    clock: Number  # since both feet are down [s]
+    cop: Annotated[np.ndarray, 2]  # that was asked for last on one foot [m]
+    middle: Annotated[np.ndarray, 2]  # between the soles at the last touchdown [m]
+    step_clock: Number  # since then [s]; < 0: there was none
     treads: Treads
 
 
@@ -74,7 +78,7 @@ class Arms(Block):
     weight: np.ndarray  # (nv,) of the posture in the QP while the arms swing as commanded
     free_weight: np.ndarray  # (nv,) else
     least_step: float  # [m] for the whole swing; less where steps are shorter
-    swinging: np.ndarray  # (1,) int: 1 while they swing as commanded
+    swinging: Integer  # 1 while they swing as commanded
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +92,8 @@ class WalkTick(Block):
     model: Program  # its kernel
     arms: Arms
     constant_height: int  # 1: the gait's own height holds, and no model is asked
-    stance: np.ndarray  # (2,) scratch: the middle of what the stance sole reaches [m]
-    swinging: np.ndarray  # (2,) scratch: the same of the other one
+    stance: Annotated[np.ndarray, 2]  # scratch: the middle of what the stance sole reaches [m]
+    swinging: Annotated[np.ndarray, 2]  # scratch: the same of the other one
 
     @property
     def memory(self) -> StepMemory:
@@ -97,6 +101,6 @@ class WalkTick(Block):
         return self.capture.memory
 
     @property
-    def swing(self) -> SwingArrays:
+    def swing(self) -> Swing:
         """The way of the swinging foot."""
         return self.capture.swing

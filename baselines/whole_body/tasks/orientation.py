@@ -1,7 +1,7 @@
 """The task of holding a body's orientation, such as a level trunk."""
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into, turn_error, turned
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.body_points import (
     BodyPoint,
     body_point,
@@ -33,8 +32,8 @@ class OrientationBlock(Block):
     k: float  # [1/s²]
     d: float  # [1/s]
     weight: float  # per (rad/s²)²
-    desired: np.ndarray  # (3, 3) scratch: R_ref in the world
-    error: np.ndarray  # (3,) scratch
+    desired: Annotated[np.ndarray, 3, 3]  # scratch: R_ref in the world
+    error: Annotated[np.ndarray, 3]  # scratch
 
 
 @compiled
@@ -78,10 +77,9 @@ class Orientation(Task[OrientationBlock]):
         """The task in SI units, its reference that of the standing robot."""
         units, point = robot.units, body_point(robot, self.body, (0.0, 0.0, 0.0))
         k, d = spring(units, self.stiffness, self.damping_ratio)
-        return OrientationBlock(
+        return OrientationBlock.allocate(
             point=point, axes=standing_frame(robot, point)[1], turns=self.frame == "heading",
             k=k, d=d, weight=float(self.weight / units.omega**4),
-            desired=guarded_zeros((3, 3)), error=guarded_zeros(3),
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: OrientationBlock) -> Rows:

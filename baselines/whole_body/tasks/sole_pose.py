@@ -1,7 +1,7 @@
 """The task of moving a sole along a trajectory: the swing foot's."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class SolePoseGains(Block):
     weight: float  # per (m/s²)²
     turn_weight: float  # per (rad/s²)²
     yaw_weight: float  # the same, about the vertical
-    error: np.ndarray  # (3,) scratch
+    error: Annotated[np.ndarray, 3]  # scratch
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.stepping.planning.config import SwingTask
-from poise.baselines.balance.stepping.planning.swing import Swing, advance_high, aim_swing
+from poise.baselines.balance.stepping.planning.swing import (
+    advance_high,
+    aim_swing,
+    swing_at,
+    time_left,
+)
 from poise.baselines.balance.stepping.planning.swing_speed import swing_time
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
@@ -36,20 +41,18 @@ def walking(controller, terrain=None, seed=0, seconds=4.0):
 
 def test_the_foot_is_high_before_it_is_far_and_comes_down_when_it_is_there():
     task = SwingTask(clearance=0.08, lift=0.35, landing_speed=0.3)
-    swing = Swing(np.array([0.0, 0.1, 0.01]), 0.4, task, robot().units)
-    aim_swing(swing.arrays, 0.3, 0.1, 0.4)
+    swing = swing_at(np.array([0.0, 0.1, 0.01]), 0.4, task, robot().units)
+    aim_swing(swing, 0.3, 0.1, 0.4)
     top, lower, way = 0.09, 0.75, []
-    while swing.remaining > 0.0:
-        advance_high(swing.arrays, top, lower, DT)
-        way.append((swing.time, *swing.reference[0, [0, 2]], *swing.reference[1:, 2]))
+    while time_left(swing) > 0.0:
+        advance_high(swing, top, lower, DT)
+        way.append((swing.time[0], *swing.reference[0, [0, 2]], *swing.reference[1:, 2]))
     time, x, z, speed, accel = np.array(way).T
     high = (time > 0.35 * 0.4) & (time < 0.75 * 0.4)
     assert np.all(np.abs(z[high] - top) < 2e-3)
     assert z[x < 0.05].max() > 0.08  # up, where most swings go ahead
     assert x[time >= 0.75 * 0.4].min() > 0.85 * 0.3
-    assert (x[-1], z[-1], speed[-1]) == pytest.approx(
-        (0.3, 0.01, -swing.arrays.landing_speed), abs=2e-3
-    )
+    assert (x[-1], z[-1], speed[-1]) == pytest.approx((0.3, 0.01, -swing.landing_speed), abs=2e-3)
     assert np.abs(np.diff(speed)).max() < 1.5 * np.abs(accel).max() * DT  # C¹ at least, everywhere
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from poise.baselines.balance.stepping.controller import SteppingController
 from poise.baselines.balance.stepping.planning.config import StepLimits
-from poise.baselines.balance.stepping.planning.cop_region import CopRegion
+from poise.baselines.balance.stepping.planning.cop_region import cop_region
 from poise.baselines.controller import as_base_controller
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.compiled.maths.pendulum import capture_distance, duration_factor
@@ -36,7 +36,7 @@ class NStepLimit:
     def __init__(self, limits: PushLimits, steps: StepLimits | None = None):
         self.limits, self.steps = limits, steps or StepLimits()
         standing = limits.standing
-        region = CopRegion(limits.robot, 1.0).both(standing.sole_points, standing.heading_yaw)
+        region = cop_region(limits.robot, 1.0).both(standing.sole_points, standing.heading_yaw)
         self._region = region - standing.com[:2]
 
     @property

@@ -54,6 +54,6 @@ def _uses(robot: Robot, configs: dict[str, ControllerConfig]) -> Uses:
             refused[name] = str(error)
             continue
         takes.append(name)
-        if isinstance(controller, CaptureStep) and not controller.steps_possible:
+        if isinstance(controller, CaptureStep) and controller.step_limits is None:
             never.append(name)
     return Uses(tuple(takes), refused, tuple(never))

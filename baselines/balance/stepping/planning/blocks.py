@@ -1,74 +1,26 @@
 """The blocks that the kernels of this room work on: every array and number of a tick by its name.
 
-`CaptureTick` holds the others. Numbers are in SI units. Arrays of one entry are numbers that
-kernels write. The frame of the step has its origin at the stance sole and its x axis along the
-heading of the step. ns is the number of soles, nv that of the degrees of freedom.
+`CaptureTick` holds the others. Numbers are in SI units. The frame of the step has its origin at the
+stance sole and its x axis along the heading of the step. ns is the number of soles, nv that of the
+degrees of freedom.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from poise.baselines.controller import TargetArrays
 from poise.baselines.whole_body.momentum_qp import Tick
 from poise.baselines.whole_body.tick import ContactTick
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer, Number
 from poise.envs.compiled.calls import Kernel
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
-
-def zeros(dtype: type = float, **shapes: int | tuple[int, ...]) -> dict[str, Any]:
-    """The members of a block that kernels write, by name: guarded zeros of these shapes."""
-    return {name: guarded_zeros(shape, dtype) for name, shape in shapes.items()}
-
-
-@dataclass(frozen=True, eq=False)
-class RegionArrays(Block):
-    """A `CopRegion`, in the frames of the soles."""
-
-    alone: np.ndarray  # (ns, k, 2) corners of what each sole reaches alone [m]
-    corners: np.ndarray  # (ns,) int: how many of them count
-    middle: np.ndarray  # (ns, 2) their mean [m]
-    sums: np.ndarray  # (5, n, 2) corners of what two reach, beside λ p_0 + (1 − λ) p_1 [m]
-    support: np.ndarray  # (5, 48) how far these go along each direction [m]
-    directions: np.ndarray  # (48, 2) unit vectors
-    load_fractions: np.ndarray  # (5,) λ
-
-
-@dataclass(frozen=True, eq=False)
-class FeedbackArrays(Block):
-    """K of a `StepFeedback` for one robot, the signals s, and Δ = K s; rows as in `feedback.py`."""
-
-    always: np.ndarray  # (4, 9) K in m and s
-    angles: np.ndarray  # (n,) directions of falls, rising [rad]
-    added_at: np.ndarray  # (n, 4, 9) what is added to K there
-    gains: np.ndarray  # (4, 9) K of the running step
-    upright: np.ndarray  # (3,) the vertical at rest, in the root's axes
-    height: float  # h [m]
-    momentum_unit: float  # ω/(m g h) [1/(N·m·s)]
-    pivot: np.ndarray  # (3, 2) of a plan, in a swing, on both feet: momentum [m/(N·m·s)], lean [m]
-    lateral_fraction: float  # of these across the heading
-    signals: np.ndarray  # (9,) s; kernels that plan set LATER_STEP and PHASE
-    added: np.ndarray  # (4,) Δ [m, m, s, m]
-
-
-@dataclass(frozen=True, eq=False)
-class SwingArrays(Block):
-    """A `Swing`: the reference of the swinging foot's sole."""
-
-    reference: np.ndarray  # (3, 3) position, velocity, acceleration [m, s]
-    foothold: np.ndarray  # (2,) [m]
-    time: np.ndarray  # (1,) since lift-off [s]
-    duration: np.ndarray  # (1,) from lift-off to touchdown [s]
-    ground: np.ndarray  # (1,) height of the ground [m]
-    time_offset: np.ndarray  # (1,) part of the duration that feedback and a policy added [s]
-    apex: float  # height of the way above the ground [m]
-    lift: float  # fraction of the duration in which the foot rises
-    landing_speed: float  # [m/s]
-
+from .cop_region import CopRegion
+from .feedback import FeedbackArrays
+from .swing import Swing
 
 #: entries of `Search.best`: foothold [m], time from now to touchdown [s], cost [m], and the part of
 #: the time that feedback and a policy added [s]
@@ -81,10 +33,10 @@ class Search(Block):
     weighed, and the best one so far."""
 
     state: StateArrays
-    region: RegionArrays
+    region: CopRegion
     offsets: np.ndarray  # (13,) see `StepOffsets`
     feedback: FeedbackArrays
-    heading: np.ndarray  # (2,) cosine and sine of the step's heading
+    heading: Annotated[np.ndarray, 2]  # cosine and sine of the step's heading
     foot_sign: np.ndarray  # (2,) 1 for the left foot, −1 for the right one
     height: float  # h [m]
     ahead: float  # limits of the foothold in the frame of the step [m]
@@ -99,17 +51,17 @@ class Search(Block):
     lateral_offset: float
     margin: float  # [m]
     time_price: float  # [m/s]
-    arc: float  # of an `EnergyPlanner`
-    capture_point: np.ndarray  # (2,) ξ, and what turn and lean of the body add to it [m]
-    corners: np.ndarray  # (k, 2) scratch: what the stance sole reaches [m]
-    cop: np.ndarray  # (2,) the point of it that is nearest to ξ [m]
-    start: np.ndarray  # (2,) where the foot is [m]
-    foot: np.ndarray  # (1,) int: the foot that is to step
-    time: np.ndarray  # (1,) from now to touchdown [s]
-    foothold: np.ndarray  # (2,) for this foot and time [m]
-    cost: np.ndarray  # (1,) of this foothold, without the price of its time [m]
-    best: np.ndarray  # (5,) the best step, see BEST_X to BEST_OFFSET
-    best_foot: np.ndarray  # (1,) int: its foot; −1: none yet
+    arc: float  # of an `IPMStep`
+    capture_point: Annotated[np.ndarray, 2]  # ξ, and what turn and lean of the body add to it [m]
+    corners: Annotated[np.ndarray, "k", 2]  # scratch: what the stance sole reaches [m]
+    cop: Annotated[np.ndarray, 2]  # the point of it that is nearest to ξ [m]
+    start: Annotated[np.ndarray, 2]  # where the foot is [m]
+    foot: Integer  # the foot that is to step
+    time: Number  # from now to touchdown [s]
+    foothold: Annotated[np.ndarray, 2]  # for this foot and time [m]
+    cost: Number  # of this foothold, without the price of its time [m]
+    best: Annotated[np.ndarray, 5]  # the best step, see BEST_X to BEST_OFFSET
+    best_foot: Integer  # its foot; −1: none yet
     foothold_rule: "Kernel[Search]"  # finds `foothold` and `cost`, as `capture_foothold` does
 
 
@@ -129,12 +81,12 @@ class Recentring(Block):
     margin: float  # [m]
     cop_distance: float  # [m]
     nominal: np.ndarray  # (2,) from the second sole to the first one in the nominal stance [m]
-    stage: np.ndarray  # (1,) int: INACTIVE, SHIFTING, SWINGING or LOADING
-    foot: np.ndarray  # (1,) int: the foot that goes back to its nominal place
-    homing: np.ndarray  # (1,) int: 1 from the lift-off of that foot until a fall begins
-    slip_time: np.ndarray  # (2,) for which each foot that should stand has had no hold [s]
-    timer: np.ndarray  # (1,) for which it has been calm; while SHIFTING, since that began [s]
-    capture_target: np.ndarray  # (2,) where ξ is brought [m]
+    stage: Integer  # INACTIVE, SHIFTING, SWINGING or LOADING
+    foot: Integer  # the foot that goes back to its nominal place
+    homing: Integer  # 1 from the lift-off of that foot until a fall begins
+    slip_time: Annotated[np.ndarray, 2]  # for which each foot that should stand has had no hold [s]
+    timer: Number  # for which it has been calm; while SHIFTING, since that began [s]
+    capture_target: Annotated[np.ndarray, 2]  # where ξ is brought [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,18 +116,18 @@ class StepGains(Block):
 class StepMemory(Block):
     """The memory of a controller that steps, from tick to tick."""
 
-    steps: np.ndarray  # (1,) int: steps begun since the reset
-    recovering: np.ndarray  # (1,) int: 1 from a step until the robot is calm in its nominal stance
-    foot: np.ndarray  # (1,) int: the foot that stepped last; −1: none
-    swinging: np.ndarray  # (1,) int: 1 while that foot is in the air, or about to leave
-    level_frame: np.ndarray  # (3, 3) axes of a level sole along the heading of the step
-    clock: np.ndarray  # (1,) since the last touchdown [s]
-    load: np.ndarray  # (1,) that the foot bore when its step began [N]
-    load_fraction: np.ndarray  # (1,) of this load that it still bears
-    region: np.ndarray  # (2 n + 1, 2) CoP region of both soles since the last touchdown [m]
-    corners: np.ndarray  # (1,) int: how many rows of it count; 0: it is not known
-    moved: np.ndarray  # (1,) int: 1 once the motion has moved
-    return_fraction: np.ndarray  # (1,) of the way from the stance's posture to the motion's
+    steps: Integer  # steps begun since the reset
+    recovering: Integer  # 1 from a step until the robot is calm in its nominal stance
+    foot: Integer  # the foot that stepped last; −1: none
+    swinging: Integer  # 1 while that foot is in the air, or about to leave
+    level_frame: Annotated[np.ndarray, 3, 3]  # axes of a level sole along the heading of the step
+    clock: Number  # since the last touchdown [s]
+    load: Number  # that the foot bore when its step began [N]
+    load_fraction: Number  # of this load that it still bears
+    region: Annotated[np.ndarray, "2n+1", 2]  # CoP region of both soles, of the last touchdown [m]
+    corners: Integer  # how many rows of it count; 0: it is not known
+    moved: Integer  # 1 once the motion has moved
+    return_fraction: Number  # of the way from the stance's posture to the motion's
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +140,7 @@ class CaptureTick(Block):
     reference_out: TargetArrays  # what the controller asks of its QPs in a step and after
     gains: StepGains
     search: Search
-    swing: SwingArrays
+    swing: Swing
     memory: StepMemory
     recentring: Recentring
     offsets: np.ndarray  # (13,) see `StepOffsets`
@@ -199,10 +151,10 @@ class CaptureTick(Block):
     tau: np.ndarray  # (nv−6,) torques of the tick [N·m]
     vdot: np.ndarray  # (nv,) accelerations that they are to bring
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
-    to_python: np.ndarray  # (1,) int: 1 where Python has to solve `standing`
-    corners: np.ndarray  # (k, 2) scratch
-    cloud: np.ndarray  # (n, 2) scratch
-    pair: np.ndarray  # (2,) scratch
-    vector: np.ndarray  # (3,) scratch
+    to_python: Integer  # 1 where Python has to solve `standing`
+    corners: Annotated[np.ndarray, "k", 2]  # scratch
+    cloud: Annotated[np.ndarray, "n", 2]  # scratch
+    pair: Annotated[np.ndarray, 2]  # scratch
+    vector: Annotated[np.ndarray, 3]  # scratch
     standing_kernel: Kernel[Tick]  # `momentum_tick`; 0: Python calls another solver
     contact_kernel: Kernel[ContactTick]  # `contact_tick`

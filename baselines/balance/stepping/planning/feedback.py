@@ -16,18 +16,19 @@ with θ from the heading to the CoM's velocity at lift-off and w linear between 
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along, turned
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 
-from .blocks import FeedbackArrays
-from .config import SIGNALS, FallFeedback, PivotConfig, StepFeedback
+from .config import FallFeedback, PivotConfig, StepFeedback
 
 # rows of K
 AHEAD, OUTWARD, TIME, HEIGHT = range(4)
@@ -40,34 +41,42 @@ PLAN, SWING, STANCE = range(3)  # rows of the pivot's gains
 LX, LY = 3, 4  # of the centroidal momentum [P; L]
 
 
+@dataclass(frozen=True, eq=False)
+class FeedbackArrays(Block):
+    """K of a `StepFeedback` for one robot, the signals s, and Δ = K s; rows as in `feedback.py`."""
+
+    always: Annotated[np.ndarray, 4, 9]  # K in m and s
+    angles: Annotated[np.ndarray, "n"]  # directions of falls, rising [rad]
+    added_at: Annotated[np.ndarray, "n", 4, 9]  # what is added to K there
+    gains: Annotated[np.ndarray, 4, 9]  # K of the running step
+    upright: np.ndarray  # (3,) the vertical at rest, in the root's axes
+    height: float  # h [m]
+    momentum_unit: float  # ω/(m g h) [1/(N·m·s)]
+    # of a plan, in a swing, on both feet: momentum [m/(N·m·s)], lean [m]
+    pivot: Annotated[np.ndarray, 3, 2]
+    lateral_fraction: float  # of these across the heading
+    signals: Annotated[np.ndarray, 9]  # s; kernels that plan set LATER_STEP and PHASE
+    added: Annotated[np.ndarray, 4]  # Δ [m, m, s, m]
+
+
 def feedback_arrays(
     robot: Robot, always: StepFeedback, falls: Mapping[str, FallFeedback], pivot: PivotConfig
 ) -> FeedbackArrays:
     """K for one robot: gains that hold always, and those that `falls` add in a first step."""
     h, omega = robot.height_com, robot.omega
     units = np.array([h, h, 1.0 / omega, h])
-    rising, size = sorted(falls.values(), key=lambda fall: fall.angle), (4, len(SIGNALS))
-    law, gains, angles = guarded_zeros(size), guarded_zeros(size), guarded_zeros(len(rising))
-    added_at = guarded_zeros((len(rising), *size))
-    law[:] = gains[:] = units[:, None] * always.matrix()
+    rising = sorted(falls.values(), key=lambda fall: fall.angle)
+    made = FeedbackArrays.allocate(
+        {"n": len(rising)}, upright=robot_arrays(robot).root_standing[2].copy(), height=float(h),
+        momentum_unit=float(omega / robot.units.moment), lateral_fraction=pivot.lateral_fraction,
+    )  # fmt: skip
+    made.always[:] = made.gains[:] = units[:, None] * always.matrix()
     for k, fall in enumerate(rising):
-        angles[k], added_at[k] = np.radians(fall.angle), units[:, None] * fall.matrix()
-    unit, rows = h * omega / robot.units.moment, guarded_zeros((3, 2))
+        made.angles[k], made.added_at[k] = np.radians(fall.angle), units[:, None] * fall.matrix()
+    unit = h * omega / robot.units.moment
     for k, row in enumerate((pivot.plan, pivot.swing, pivot.stance)):
-        rows[k] = row.momentum * unit, row.lean * h
-    return FeedbackArrays(
-        always=law,
-        angles=angles,
-        added_at=added_at,
-        gains=gains,
-        upright=robot_arrays(robot).root_standing[2].copy(),
-        height=float(h),
-        momentum_unit=float(omega / robot.units.moment),
-        pivot=rows,
-        lateral_fraction=pivot.lateral_fraction,
-        signals=guarded_zeros(len(SIGNALS)),
-        added=guarded_zeros(4),
-    )
+        made.pivot[k] = row.momentum * unit, row.lean * h
+    return made
 
 
 @compiled

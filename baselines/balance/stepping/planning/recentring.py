@@ -23,8 +23,6 @@ from .blocks import (
     CaptureTick,
     Recentring,
     Search,
-    SwingArrays,
-    zeros,
 )
 from .config import RecentringConfig
 from .feedback import PHASE
@@ -38,7 +36,7 @@ from .search import (
     to_step_frame,
     to_world,
 )
-from .swing import FROZEN, LANDING, start_swing, time_left
+from .swing import FROZEN, LANDING, Swing, start_swing, time_left
 from .units import in_si
 
 # No foot goes back; ξ is shifted to one foot; the other foot swings; it takes up its load.
@@ -52,12 +50,10 @@ SLIP_TIME, SLIP_SPEED = 0.04, 0.25
 def recentring_arrays(robot: Robot, config: RecentringConfig) -> Recentring:
     """`config` for one robot."""
     feet = nominal_feet(robot)
-    return Recentring(
+    return Recentring.allocate(
         **in_si(Recentring, config, robot.units),
         calm_cosine=float(np.cos(np.radians(config.calm_tilt))),
         nominal=(feet[0] - feet[1])[:2].copy(),
-        **zeros(np.int64, stage=1, foot=1, homing=1),
-        **zeros(slip_time=2, timer=1, capture_target=2),
     )
 
 
@@ -201,7 +197,7 @@ def plan_recentring(q: Search, r: Recentring) -> None:
 
 
 @compiled
-def replan_recentring(q: Search, r: Recentring, w: SwingArrays) -> bool:
+def replan_recentring(q: Search, r: Recentring, w: Swing) -> bool:
     """The same in its swing; False where ξ can no longer be caught near the nominal stance."""
     q.feedback.signals[PHASE] = w.time[0] / w.duration[0]
     set_foot(q, r.foot[0])

@@ -1,28 +1,37 @@
-"""The compiled part of `StepPlanner`: steps of either foot in several times, and the cheapest."""
+"""The planner of a step: of either foot in several times the cheapest that stops the fall."""
+
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.balance.references.targets import FOOTHOLD_X, FOOTHOLD_Y
 from poise.baselines.balance.references.targets import TIME as TIME_OFFSET
-from poise.envs.compiled.calls import call
+from poise.envs.compiled.calls import NO_KERNEL, address_of, call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import drifted_point
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, placed
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.robots.robot import Robot
 
-from .blocks import BEST_COST, BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, Search, SwingArrays
-from .cop_region import distance_beyond, single_support_region
+from .blocks import BEST_COST, BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, Search
+from .config import FootholdChoice, StepLimits
+from .cop_region import CopRegion, distance_beyond, single_support_region
 from .feedback import (
     AHEAD,
     OUTWARD,
     PHASE,
     PLAN,
     TIME,
+    FeedbackArrays,
     evaluate_feedback,
     pivot_offset,
     schedule_gains,
 )
-from .swing import FROZEN, time_left
+from .swing import FROZEN, Swing, time_left
+from .units import in_si
 
 TIMES = 8  # step times that are weighed against each other
 CHANGE_PRICE = 0.02  # [m/s] of another step time while the foot swings
@@ -188,7 +197,7 @@ def plan_step(q: Search) -> None:
 
 
 @compiled
-def replan_step(q: Search, foot: int, w: SwingArrays) -> None:
+def replan_step(q: Search, foot: int, w: Swing) -> None:
     """Foothold and time left of the running step `w` of `foot`: the best of the search."""
     low = max(q.time_min - w.time[0], FROZEN)
     high = max(q.time_max - w.time[0], low)
@@ -207,3 +216,27 @@ def replan_step(q: Search, foot: int, w: SwingArrays) -> None:
         _weigh(q, time, CHANGE_PRICE * abs(time - planned))
     _weigh(q, planned, 0.0)
     _offset_time(q)
+
+
+def make_search(
+    robot: Robot,
+    state: StateArrays,
+    region: CopRegion,
+    limits: StepLimits,
+    choice: FootholdChoice,
+    feedback: FeedbackArrays,
+    offsets: np.ndarray,
+    rule: Callable[[Search], None] = capture_foothold,
+    arc: float = 0.0,
+) -> Search:
+    """The search for steps of a robot from a state; `rule` finds the foothold of a foot and time.
+
+    `offsets` (13,) are the `values` of `StepOffsets`, `arc` is that of `IPMStepConfig`.
+    """
+    search = Search.allocate(
+        {"k": region.alone.shape[1]}, state=state, region=region, offsets=offsets,
+        feedback=feedback, foot_sign=foot_signs(robot), height=robot.units.height,
+        **in_si(Search, limits, robot.units), **in_si(Search, choice, robot.units),
+        arc=float(arc), foothold_rule=NO_KERNEL,
+    )  # fmt: skip
+    return replace(search, foothold_rule=address_of(rule, search))

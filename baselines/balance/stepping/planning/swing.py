@@ -1,21 +1,47 @@
 """The way of a swing foot: C² from wherever it is to a foothold that may move on the way."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
 import numpy as np
 
+from poise.baselines.controller import TargetArrays
+from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.tasks.sole_pose import SolePose, SolePoseBlock, SolePoseGains
 from poise.baselines.whole_body.tasks.task import BoundTask
-from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.block import Block, Number
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import Units
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.kinematics import StateArrays
 
-from .blocks import SwingArrays, zeros
 from .config import SwingTask
 from .units import in_si
 
 LANDING = 0.6  # fraction of a swing after which contact is touchdown, not the lift-off
+# ticks of `CaptureTick`: the soles in contact, and those in the air
+SUPPORTS = (("on_first", (0,), (1,)), ("on_second", (1,), (0,)), ("on_both", (0, 1), ()))
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
+
+
+@dataclass(frozen=True, eq=False)
+class Swing(Block):
+    """The reference of one swing foot's sole, planned anew each tick from its own last value.
+
+    Vertically it rises to the apex in the fraction `lift` of the time. Then it comes down, and goes
+    on at the landing speed where the ground is late.
+    """
+
+    reference: Annotated[np.ndarray, 3, 3]  # position, velocity, acceleration [m, s]
+    foothold: Annotated[np.ndarray, 2]  # [m]
+    time: Number  # since lift-off [s]
+    duration: Number  # from lift-off to touchdown [s]
+    ground: Number  # height of the ground [m]
+    time_offset: Number  # part of the duration that feedback and a policy added [s]
+    apex: float  # height of the way above the ground [m]
+    lift: float  # fraction of the duration in which the foot rises
+    landing_speed: float  # [m/s]
 
 
 @compiled
@@ -38,7 +64,7 @@ def quintic(
 
 
 @compiled
-def start_swing(w: SwingArrays, point: np.ndarray, ground: float, duration: float) -> None:
+def start_swing(w: Swing, point: np.ndarray, ground: float, duration: float) -> None:
     """Begin a swing of `duration` [s] at rest at `point` (3,) [m], above `ground` [m]."""
     for a in range(3):
         w.reference[0, a], w.reference[1, a], w.reference[2, a] = point[a], 0.0, 0.0
@@ -47,13 +73,13 @@ def start_swing(w: SwingArrays, point: np.ndarray, ground: float, duration: floa
 
 
 @compiled
-def time_left(w: SwingArrays) -> float:
+def time_left(w: Swing) -> float:
     """The time until touchdown is planned [s]."""
     return max(w.duration[0] - w.time[0], 0.0)
 
 
 @compiled
-def aim_swing(w: SwingArrays, x: float, y: float, duration: float) -> None:
+def aim_swing(w: Swing, x: float, y: float, duration: float) -> None:
     """Lead to the foothold (x, y) [m] in `duration` [s]; nothing in the last `FROZEN` seconds."""
     if time_left(w) > FROZEN:
         w.foothold[0], w.foothold[1] = x, y
@@ -71,7 +97,7 @@ def _lead(
 
 
 @compiled
-def advance_over(w: SwingArrays, apex: float, dt: float) -> None:
+def advance_over(w: Swing, apex: float, dt: float) -> None:
     """Go `dt` [s] further: up to an `apex` above the ground [m], down to it, on at the landing
     speed."""
     rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
@@ -91,7 +117,7 @@ def advance_over(w: SwingArrays, apex: float, dt: float) -> None:
 
 
 @compiled
-def advance_high(w: SwingArrays, top: float, lower: float, dt: float) -> None:
+def advance_high(w: Swing, top: float, lower: float, dt: float) -> None:
     """The same over rough ground: up to a height `top` [m] at `lift`, and on at it until the
     fraction `lower`: the foot is high before it is far, and comes down where it is to land."""
     start, now = w.time[0], w.reference
@@ -102,46 +128,12 @@ def advance_high(w: SwingArrays, top: float, lower: float, dt: float) -> None:
         now[0, 2], now[1, 2], now[2, 2] = quintic(z, speed, accel, top, 0.0, 0.0, end - start, dt)
 
 
-class Swing(Copyable):
-    """The reference of one swing foot, planned anew each tick from its own last value: C² always.
-
-    Vertically it rises to the clearance in the fraction `lift` of the time. Then it comes down,
-    and goes on at the landing speed where the ground is late.
-    """
-
-    def __init__(self, point: np.ndarray, duration: float, task: SwingTask, units: Units):
-        self.task = task
-        self.arrays = SwingArrays(
-            **in_si(SwingArrays, task, units),
-            apex=task.clearance * units.height,
-            **zeros(reference=(3, 3), foothold=2, time=1, duration=1, ground=1, time_offset=1),
-        )
-        start_swing(self.arrays, np.array(point, dtype=float), float(point[2]), float(duration))
-
-    @property
-    def reference(self) -> np.ndarray:
-        """(3, 3) Position, velocity and acceleration now [m, s]."""
-        return self.arrays.reference
-
-    @property
-    def foothold(self) -> np.ndarray:
-        """(2,) The place where the sole is to land [m]."""
-        return self.arrays.foothold
-
-    @property
-    def time(self) -> float:
-        """The time since lift-off [s]."""
-        return float(self.arrays.time[0])
-
-    @property
-    def duration(self) -> float:
-        """The time from lift-off to touchdown [s]."""
-        return float(self.arrays.duration[0])
-
-    @property
-    def remaining(self) -> float:
-        """The time until touchdown is planned [s]."""
-        return time_left(self.arrays)
+def swing_at(point: np.ndarray, duration: float, task: SwingTask, units: Units) -> Swing:
+    """The swing of a foot at rest at `point` (3,) [m], of `duration` [s]."""
+    numbers, apex = in_si(Swing, task, units), task.clearance * units.height
+    swing = Swing.allocate(**numbers, apex=apex)
+    start_swing(swing, np.array(point, dtype=float), float(point[2]), float(duration))
+    return swing
 
 
 def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:
@@ -150,9 +142,9 @@ def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:
     k = task.stiffness * rate2
     d = 2.0 * task.damping_ratio * np.sqrt(k)
     turn = task.turn_weight / rate2**2
-    return SolePoseGains(
+    return SolePoseGains.allocate(
         stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
-        turn_weight=float(turn), yaw_weight=float(task.yaw_fraction * turn), error=guarded_zeros(3),
+        turn_weight=float(turn), yaw_weight=float(task.yaw_fraction * turn),
     )  # fmt: skip
 
 
@@ -161,3 +153,26 @@ def swing_task(
 ) -> BoundTask:
     """The task of the QP that moves a sole along `reference` (3, 3), its `axes` (3, 3) fixed."""
     return BoundTask(SolePose(), SolePoseBlock(sole, reference, axes, gains))
+
+
+def bind_swings(
+    sets: ContactSets,
+    state: StateArrays,
+    targets: TargetArrays,
+    task: SwingTask,
+    way: np.ndarray,
+    axes: np.ndarray,
+    legs: Sequence[BoundTask] = (),
+) -> dict[str, Any]:
+    """The ticks of `CaptureTick` on the first sole, on the second one and on both.
+
+    In the air the other one follows `way` (3, 3) with its `axes` (3, 3). `legs`: what each leg that
+    stands is to do besides.
+    """
+    gains = swing_gains(sets.arrays, task)
+    ticks = {}
+    for name, soles, swinging in SUPPORTS:
+        tasks = [swing_task(foot, way, axes, gains) for foot in swinging]
+        tasks += [legs[leg] for leg in soles if legs]
+        ticks[name] = sets.sets[soles].bind(state, targets, sets, tasks)
+    return ticks

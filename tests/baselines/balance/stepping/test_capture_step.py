@@ -20,6 +20,7 @@ from poise.baselines.balance.stepping.capture_step import CaptureStep
 from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
 from poise.baselines.balance.stepping.planning.feedback import PHASE
 from poise.baselines.balance.stepping.planning.recentring import SHIFTING
+from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.baselines.controller import WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller
@@ -161,7 +162,7 @@ def test_a_foot_gives_its_load_away_before_it_lifts_off():
     """While it unloads, its part of the planned force falls; then the foot is no contact."""
 
     def look(c, *_):
-        unloading = c.swing is not None and c.swing.time == 0.0
+        unloading = c.swing is not None and c.swing.time[0] == 0.0
         return c.sets.workspace.wrenches[6 * c.foot + 2] if unloading else np.nan
 
     controller = load_controller("capture-step", robot())
@@ -213,7 +214,7 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             if left[0] > readable.FROZEN:  # the last ticks keep what was fed back
                 planner.phase = c.planner.feedback.signals[PHASE]
                 raised[0] = planner.added(state, c.foot, yaw)[3]
-            left[0] = c.swing.remaining
+            left[0] = time_left(c.swing)
         else:
             if c.recentring.stage[0] == SHIFTING and stages[-1] != SHIFTING:
                 stood.clear()  # another heading from now on

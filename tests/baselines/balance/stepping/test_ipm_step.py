@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from poise.baselines.balance.stepping.ipm_step import EnergyPlanner, IPMStep, rest_distance
+from poise.baselines.balance.stepping.ipm_step import IPMStep, energy_foothold, rest_distance
 from poise.baselines.balance.stepping.planning.config import (
     FootholdChoice,
     IPMStepConfig,
@@ -12,7 +12,7 @@ from poise.baselines.balance.stepping.planning.config import (
     StepFeedback,
     StepLimits,
 )
-from poise.baselines.balance.stepping.planning.cop_region import CopRegion
+from poise.baselines.controller import Targets
 from poise.baselines.registry import controller_config, load_controller
 from poise.envs.compiled.maths.pendulum import pendulum
 from poise.envs.compiled.maths.polygons import nearest_inside
@@ -64,9 +64,9 @@ def test_the_pendulum_moves_by_its_equation():
 def planner(arc, lateral_offset=0.0, feedback=None, **limits):
     """A planner with wide limits."""
     wide = {"ahead": 9.0, "behind": 9.0, "width_min": 1e-3, "width_max": 9.0, "speed": 99.0}
-    return EnergyPlanner(
-        robot(), CopRegion(robot()), StepLimits(**{**wide, "side_speed": 99.0, **limits}),
-        FootholdChoice(lateral_offset=lateral_offset), feedback, arc=arc,
+    return planned.Planner(
+        robot(), StepLimits(**{**wide, "side_speed": 99.0, **limits}),
+        FootholdChoice(lateral_offset=lateral_offset), feedback, rule=energy_foothold, arc=arc,
     )  # fmt: skip
 
 
@@ -147,5 +147,7 @@ def test_packaged_configuration():
     assert config.qp == controller_config("capture-step").qp
     assert config.limits.time_min == config.limits.time_max
     controller = load_controller(config, robot())
-    assert isinstance(controller, IPMStep) and isinstance(controller.planner, EnergyPlanner)
-    assert controller.planner.arc == config.arc
+    assert isinstance(controller, IPMStep)
+    state, targets = generic_state().state, Targets.standing(robot(), generic_state().state)
+    search = controller.tick(state, targets).search
+    assert search.foothold_rule.kernel is energy_foothold and search.arc == config.arc

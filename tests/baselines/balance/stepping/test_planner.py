@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.planner import StepPlanner
 from poise.baselines.balance.stepping.planning.config import (
     FallFeedback,
     FootholdChoice,
@@ -12,9 +11,8 @@ from poise.baselines.balance.stepping.planning.config import (
     StepLimits,
     SwingTask,
 )
-from poise.baselines.balance.stepping.planning.cop_region import CopRegion
 from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
-from poise.baselines.balance.stepping.planning.swing import Swing
+from poise.baselines.balance.stepping.planning.swing import swing_at
 from tests.support import planned
 from tests.support.shared import generic_state, robot
 from tests.support.stepping_reference import ReadablePlanner
@@ -34,7 +32,7 @@ CHOICE = FootholdChoice(sagittal_offset=0.07, lateral_offset=0.05, margin=0.03, 
 
 def planner(feedback=None, falls=None, **limits):
     """A planner whose step times cost something."""
-    return StepPlanner(robot(), CopRegion(robot()), StepLimits(**limits), CHOICE, feedback, falls)
+    return planned.Planner(robot(), StepLimits(**limits), CHOICE, feedback, falls)
 
 
 def falling(seed):
@@ -81,8 +79,8 @@ def test_a_running_step_is_planned_as_by_the_readable_planner(offset, feedback):
     for seed in range(8):
         state, yaw, rng = falling(seed)
         foot = seed % 2
-        swing = Swing(state.sole_points[foot], 0.35, SwingTask(), robot().units)
-        swing.arrays.time_offset[0] = offset
+        swing = swing_at(state.sole_points[foot], 0.35, SwingTask(), robot().units)
+        swing.time_offset[0] = offset
         planned.aim(swing, state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
         for _ in range(rng.integers(1, 60)):
             planned.advance(swing, 0.004)

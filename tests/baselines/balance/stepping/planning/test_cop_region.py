@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 from poise.baselines.balance.references.legs import ankle_limits, nominal_feet
 from poise.baselines.balance.stepping.planning.cop_region import (
     LOAD_FRACTIONS,
-    CopRegion,
+    cop_region,
     rest_ahead,
 )
 from poise.envs.compiled.maths.pendulum import capture_distance
@@ -79,7 +79,7 @@ def test_ankle_limits_are_the_torques_of_a_vertical_force():
 
 def test_reach_of_one_sole_ends_at_its_edge_or_at_its_ankle_torque():
     """Every corner lies in the sole, and within what the ankles hold."""
-    region = CopRegion(robot(), 1.0)
+    region = cop_region(robot(), 1.0)
     for i, sole in enumerate(robot().soles):
         normal, offset, bound = ankle_limits(robot(), i)
         corners = region.alone[i]
@@ -90,7 +90,7 @@ def test_reach_of_one_sole_ends_at_its_edge_or_at_its_ankle_torque():
 
 def test_two_soles_reach_further_than_one():
     """Each sole's own reach is inside; in the middle the ankles share the load and reach more."""
-    region, feet = CopRegion(robot()), np.array([[0.0, 0.09], [0.0, -0.09]])
+    region, feet = cop_region(robot()), np.array([[0.0, 0.09], [0.0, -0.09]])
     for i in range(2):
         own = planned.alone(region, i, feet[i], 0.0)
         assert np.all(planned.beyond(region, feet[0], feet[1], 0.0, own) < 1e-9)
@@ -100,7 +100,7 @@ def test_two_soles_reach_further_than_one():
 
 def test_distance_beyond_the_reach_agrees_with_its_hull():
     """`beyond` is zero on the hull's corners, whatever the feet and the yaw."""
-    region, rng = CopRegion(robot()), np.random.default_rng(1)
+    region, rng = cop_region(robot()), np.random.default_rng(1)
     for _ in range(5):
         yaw = rng.uniform(-3, 3)
         feet = rng.uniform(-0.2, 0.2, (2, 2)) + np.array([[0.0, 0.2], [0.0, -0.2]])
@@ -123,13 +123,13 @@ def both_soles(region, feet, yaw):
     """Points that two soles reach under all fractions of the load (n, 2)."""
     return np.vstack([
         load * feet[0] + (1.0 - load) * feet[1] + sums @ turn(yaw).T
-        for load, sums in zip(LOAD_FRACTIONS, region.arrays.sums, strict=True)
+        for load, sums in zip(LOAD_FRACTIONS, region.sums, strict=True)
     ])  # fmt: skip
 
 
 def test_reach_of_two_soles_is_the_hull_of_all_loads():
     """The corners that Qhull finds, no others: their mean is where the robot comes to rest."""
-    region, rng = CopRegion(robot()), np.random.default_rng(5)
+    region, rng = cop_region(robot()), np.random.default_rng(5)
     for _ in range(20):
         feet, yaw = generic_feet(rng)
         cloud = both_soles(region, feet, yaw)
@@ -145,7 +145,7 @@ def test_reach_of_two_soles_is_the_hull_of_all_loads():
 @pytest.mark.parametrize("name", ["humanoid", "compact"])
 def test_reach_of_two_soles_along_the_axes(name):
     """Feet that face along x: points of one upright edge differ in x by rounding."""
-    region, rng = CopRegion(load_robot(name)), np.random.default_rng(7)
+    region, rng = cop_region(load_robot(name)), np.random.default_rng(7)
     for _ in range(20):
         feet = rng.uniform(-0.2, 0.2, (2, 2)) + np.array([[0.0, 0.2], [0.0, -0.2]])
         feet[1, 0] = feet[0, 0] + rng.uniform(-1e-15, 1e-15)
@@ -158,7 +158,7 @@ def test_reach_of_two_soles_along_the_axes(name):
 
 def test_distance_beyond_the_reach_is_that_of_the_readable_form():
     """At generic points, within and outside."""
-    region, rng = CopRegion(robot()), np.random.default_rng(6)
+    region, rng = cop_region(robot()), np.random.default_rng(6)
     for _ in range(20):
         feet, yaw = generic_feet(rng)
         xi = feet.mean(axis=0) + rng.uniform(-0.3, 0.3, 2)
@@ -168,8 +168,10 @@ def test_distance_beyond_the_reach_is_that_of_the_readable_form():
 
 def test_steps_end_where_the_posture_has_the_centre_of_mass():
     """In the nominal stance the middle of the region and `rest_ahead` make the CoM's place."""
-    toddler = CopRegion(robot("toddler"))
+    toddler = cop_region(robot("toddler"))
     middle = toddler.both(nominal_feet(robot("toddler")), 0.0).mean(axis=0)[0]
-    assert middle + rest_ahead(toddler) == pytest.approx(robot("toddler").com_ahead)
-    assert abs(rest_ahead(toddler)) > 0.01
-    assert rest_ahead(CopRegion(robot())) == 0.0  # its gains say where
+    assert middle + rest_ahead(robot("toddler"), toddler) == pytest.approx(
+        robot("toddler").com_ahead
+    )
+    assert abs(rest_ahead(robot("toddler"), toddler)) > 0.01
+    assert rest_ahead(robot(), cop_region(robot())) == 0.0  # its gains say where

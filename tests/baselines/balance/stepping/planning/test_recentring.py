@@ -199,7 +199,7 @@ def test_where_the_weight_goes_before_a_step_home(direction):
     axes = np.array([ahead, [-ahead[1], ahead[0]]])  # rows
     way = axes @ (soles[foot] - soles[1 - foot]) - home
     assert np.linalg.norm(way) > 0.1
-    rest = controller.region.arrays.middle[1 - foot] + c.counterbalance * way
+    rest = controller.region.middle[1 - foot] + c.counterbalance * way
     rest = rest + c.capture_offset * h * home / np.linalg.norm(home)
     np.testing.assert_allclose(
         t.recentring.capture_target, soles[1 - foot] + rest @ axes, atol=1e-12

@@ -75,7 +75,7 @@ def test_slow_legs_step_less_far_and_take_longer() -> None:
     assert limits is not None
     assert limits.speed < given.speed and limits.side_speed < given.side_speed
     assert given.time_min < limits.time_min <= limits.time_max == given.time_max
-    assert CaptureStep(damped(8.0), config()).planner.limits == limits
+    assert CaptureStep(damped(8.0), config()).step_limits == limits
 
 
 def test_legs_that_would_land_too_late_never_step() -> None:
