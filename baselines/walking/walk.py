@@ -87,7 +87,7 @@ class Walk(Commanded, CaptureStep):
         config = config or WalkConfig()
         prepare("contacts", "planner", "walking")
         gait = self._gait_config = self._level_gait = config.gait
-        check_qps(config, gait__qp=gait.qp)
+        check_qps(config, {"gait.qp": gait.qp})
         limits = limits_of_legs(robot, gait)
         self.gait_limits = limits or gait.limits  #: of the steps of a walk
         self.gait = allocate_gait(gait, robot.units, limits)

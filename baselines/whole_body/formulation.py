@@ -42,8 +42,9 @@ from .constraint_rows import (
     wrench_rows,
 )
 from .contacts.contact import ContactRows
-from .limits.limit import BoundLimit, Bounds
+from .limits.limit import Bounds, Limit
 from .parameters import QPParameters
+from .parts.part import Bound
 from .tasks.task import Rows
 
 
@@ -76,7 +77,7 @@ def build(
     tasks: Sequence[Rows] = (),
     constraints: Sequence[Bounds] = (),
     points: Sequence[ContactRows] = (),
-    limits: Iterable[BoundLimit] = (),
+    limits: Iterable[Bound[Limit]] = (),
 ) -> QP:
     """The QP of one tick in x = (v̇, w) or (v̇, w, u_root), with `tasks` and `constraints` added.
 

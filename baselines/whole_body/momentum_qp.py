@@ -1,5 +1,6 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -14,26 +15,21 @@ from poise.baselines.controller import (
 from poise.baselines.solvers import QP, Status, make_solver
 from poise.baselines.warmup import prepare
 from poise.envs.compiled.calls import Kernel, address_of
-from poise.envs.physics.arrays import robot_arrays
+from poise.envs.compiled.copies import Copyable
+from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .contacts.contact import BoundContact, bind_contacts, contact_arrays
+from .contacts.contact import contact_arrays
 from .gains import COMPILED_SOLVER, CoMTask, MomentumQPConfig
-from .limits.limit import BoundLimit, bind_limits
 from .parameters import QPParameters, qp_parameters
+from .parts.part import Bound, bind_parts
 from .reduced_qp import Assembly, assemble
 from .stack import fill_from_python, limit_program, make_stack
-from .tasks.task import BoundTask, bind_tasks
+from .tasks.task import Task
 from .tick import Tick, accept, allocate_memory, forget, momentum_tick, release_joints, solve
-from .workspace import allocate_workspace
-
-
-def prepare_rows(config: MomentumQPConfig) -> None:
-    """Have the kernels of its tasks, contacts and limits compiled, where there are any."""
-    if config.tasks or config.contacts or config.limits:
-        prepare("rows")
+from .workspace import Workspace, allocate_workspace
 
 
 def com_offset(robot: Robot, task: CoMTask) -> float:
@@ -47,13 +43,8 @@ def com_offset(robot: Robot, task: CoMTask) -> float:
     return task.offset * robot.height_com
 
 
-class MomentumQP(CompiledController):
-    """Tracks a posture, the CoM through linear and the CoP through angular momentum.
-
-    `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
-    `formulation.py`. After a call, `vdot`, `wrenches`, `forces`, `root_wrench` and `failures` tell
-    what was found. Raises ConfigError for an unknown solver or solver option, and for a task, a
-    contact or a limit of a body or a joint that the robot does not have.
+class BoundQP(Copyable):
+    """A configuration of the momentum QP for one robot, and what outlives its ticks.
 
     Attributes:
         tasks: those of the configuration by name; the arrays of a task's `block`, such as its
@@ -61,26 +52,69 @@ class MomentumQP(CompiledController):
         contacts, limits: likewise.
     """
 
-    def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
-        self.robot = robot
-        self.config = config or MomentumQPConfig()
-        prepare_rows(self.config)
-        self.period = self.config.period
+    def __init__(self, robot: Robot, config: MomentumQPConfig):
+        if config.tasks or config.contacts or config.limits:
+            prepare("rows")
+        self.robot, self.config, self.period = robot, config, config.period
         self.arrays = robot_arrays(robot)
-        self.parameters = qp_parameters(robot, self.arrays, self.config)
-        self.tasks: dict[str, BoundTask] = bind_tasks(self.config.tasks, robot)
-        self.contacts: dict[str, BoundContact] = bind_contacts(self.config.contacts, robot)
-        self.limits: dict[str, BoundLimit] = bind_limits(self.config.limits, robot)
-        points = self.contacts.values()
-        self.workspace = allocate_workspace(
-            self.arrays,
-            self.parameters.cone.shape[1],
-            self.config.root == "soft",
-            [point.chain for point in points],
-            sum(point.contact.cone_rows for point in points),
-            sum(limit.size for limit in self.limits.values()),
-        )
+        self.parameters = qp_parameters(robot, self.arrays, config)
+        self.tasks = bind_parts(config.tasks, robot, "tasks")
+        self.contacts = bind_parts(config.contacts, robot, "contacts")
+        self.limits = bind_parts(config.limits, robot, "limits")
         self.memory = allocate_memory(self.parameters.torque_limit)
+
+    @property
+    def failures(self) -> int:
+        """The ticks since the reset at which the QP was not solved."""
+        return int(self.memory.failures[0])
+
+    def new_workspace(self, arrays: RobotArrays, p: QPParameters) -> Workspace:
+        """Zeroed scratch for the soles of `arrays`."""
+        points = self.contacts.values()
+        return allocate_workspace(
+            arrays, p.cone.shape[1], p.soft_root,
+            [contact.chain(block) for contact, block in points],
+            sum(contact.cone_rows for contact, _ in points),
+            sum(limit.size(block) for limit, block in self.limits.values()),
+        )  # fmt: skip
+
+    def new_assembly(
+        self,
+        arrays: RobotArrays,
+        s: StateArrays,
+        p: QPParameters,
+        t: TargetArrays,
+        ws: Workspace,
+        whole: StateArrays,
+        tasks: Iterable[Bound[Task]] = (),
+    ) -> Assembly:
+        """The problem of the soles of a state `s`, with `tasks` after those of the configuration.
+
+        Tasks and limits read `whole`, the state with all soles.
+        """
+        points = list(self.contacts.values())
+        return Assembly(
+            robot=arrays, state=s, parameters=p, targets=t, period=self.period, workspace=ws,
+            contacts=contact_arrays(s, points, ws.contact_accel, ws.force_weights, ws.force_des),
+            tasks=make_stack([*self.tasks.values(), *tasks], whole, ws),
+            limits=limit_program(self.limits.values(), whole, ws),
+        )  # fmt: skip
+
+
+class MomentumQP(BoundQP, CompiledController):
+    """Tracks a posture, the CoM through linear and the CoP through angular momentum.
+
+    `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
+    `formulation.py`. After a call, `vdot`, `wrenches`, `forces`, `root_wrench` and `failures` tell
+    what was found. Raises ConfigError for an unknown solver or solver option, and for a task, a
+    contact or a limit of a body or a joint that the robot does not have.
+    """
+
+    config: MomentumQPConfig
+
+    def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
+        super().__init__(robot, config or MomentumQPConfig())
+        self.workspace = self.new_workspace(self.arrays, self.parameters)
         self.com_offset = com_offset(robot, self.config.com)
         self.solver = None
         if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
@@ -88,10 +122,6 @@ class MomentumQP(CompiledController):
         self._motor_joints = self.arrays.motor_dofs - 6
         self._assembly: Assembly | None = None
         self._tick: Tick | None = None
-
-    @property
-    def failures(self) -> int:
-        return int(self.memory.failures[0])
 
     @property
     def vdot(self) -> np.ndarray:
@@ -133,7 +163,7 @@ class MomentumQP(CompiledController):
     @property
     def compiled(self) -> bool:
         """True with the compiled solver, and kernels for all tasks; see `CompiledController`."""
-        kernels = all(bound.task.kernel is not None for bound in self.tasks.values())
+        kernels = all(task.kernel is not None for task, _ in self.tasks.values())
         return super().compiled and self.solver is None and kernels
 
     def gains(self) -> QPParameters:
@@ -148,26 +178,11 @@ class MomentumQP(CompiledController):
         """The block that `assemble` fills the workspace from."""
         s, t, known = state.arrays, targets.arrays(), self._assembly
         if known is None or known.state is not s:
-            known = self._new_assembly(s, t)
+            known = self.new_assembly(self.arrays, s, self.parameters, t, self.workspace, s)
         elif known.targets is not t or known.parameters is not self.parameters:
             known = replace(known, targets=t, parameters=self.parameters)
         self._assembly = known
         return known
-
-    def _new_assembly(self, s: StateArrays, t: TargetArrays) -> Assembly:
-        """The block for other state arrays, from which the contacts and tasks read too."""
-        ws, points = self.workspace, list(self.contacts.values())
-        return Assembly(
-            robot=self.arrays,
-            state=s,
-            contacts=contact_arrays(s, points, ws.contact_accel, ws.force_weights, ws.force_des),
-            parameters=self.parameters,
-            targets=t,
-            period=self.period,
-            tasks=make_stack(self.tasks.values(), s, ws),
-            limits=limit_program(self.limits.values(), s, ws),
-            workspace=ws,
-        )
 
     def tick(self, state: RobotState, targets: Targets) -> Tick:
         """The block that `momentum_tick` works on."""

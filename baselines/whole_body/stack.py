@@ -1,6 +1,6 @@
 """Tasks and limits of a reduced problem besides its own: which rows are whose."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -13,8 +13,9 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 
-from .limits.limit import BoundArrays, BoundLimit, LimitTick, ReducedMotion
-from .tasks.task import BoundTask, RowArrays, Rows, TaskTick
+from .limits.limit import BoundArrays, Limit, LimitTick, ReducedMotion
+from .parts.part import Bound
+from .tasks.task import RowArrays, Task, TaskTick
 from .workspace import Workspace
 
 
@@ -30,13 +31,10 @@ class TaskStack(Block):
     fill: Program  # the kernels of the tasks, each with its rows
 
 
-def make_stack(
-    tasks: Iterable[BoundTask], state: StateArrays, workspace: Workspace, further: int = 0
-) -> TaskStack:
-    """The tasks one below the other, then `further` rows that no task fills."""
+def make_stack(tasks: Iterable[Bound[Task]], state: StateArrays, workspace: Workspace) -> TaskStack:
+    """The tasks one below the other."""
     tasks = tuple(tasks)
-    k = sum(task.size for task, _ in tasks) + further
-    nv, n = len(state.qvel), len(workspace.g)
+    k, nv, n = sum(task.size for task, _ in tasks), len(state.qvel), len(workspace.g)
     A, b, weights, calls, first = guarded_zeros((k, nv)), guarded_zeros(k), guarded_zeros(k), [], 0
     for task, block in tasks:
         own = slice(first, first + task.size)
@@ -48,35 +46,29 @@ def make_stack(
 
 
 def limit_program(
-    limits: Iterable[BoundLimit], state: StateArrays, workspace: Workspace
+    limits: Iterable[Bound[Limit]], state: StateArrays, workspace: Workspace
 ) -> Program:
     """Return the kernels of limits, whose rows are the last constraints of the workspace."""
-    limits, ws, calls = tuple(limits), workspace, []
+    ws, calls = workspace, []
+    sized = [(limit, block, limit.size(block)) for limit, block in limits]
     motion = ReducedMotion(V=ws.V, vdot0=ws.vdot0, T=ws.T, tau0=ws.tau0)
-    first = len(ws.l) - sum(limit.size for limit in limits)
-    for each in limits:
-        own = slice(first, first + each.size)
+    first = len(ws.l) - sum(size for _, _, size in sized)
+    for limit, block, size in sized:
+        own = slice(first, first + size)
         rows = BoundArrays(C=ws.C[own], l=ws.l[own], u=ws.u[own])
-        calls.append((each.limit.kernel, LimitTick(state, motion, each.block, rows)))
+        calls.append((limit.kernel, LimitTick(state, motion, block, rows)))
         first = own.stop
     return Program.of(calls)
 
 
-def put_rows(stack: TaskStack, rows: Sequence[Rows], first: int = 0) -> None:
-    """Write rows into the stack, from its row `first` on."""
-    for each in rows:
-        own = slice(first, first + len(each.b))
-        stack.A[own], stack.b[own], stack.weights[own] = each.A, each.b, each.weights
-        first = own.stop
-
-
-def fill_from_python(stack: TaskStack, tasks: Iterable[BoundTask], state: RobotState) -> None:
-    """Write the rows of the tasks that have no kernel; they are the stack's first ones."""
+def fill_from_python(stack: TaskStack, tasks: Iterable[Bound[Task]], state: RobotState) -> None:
+    """Write the rows of the tasks that have no kernel."""
     first = 0
     for bound in tasks:
-        if bound.task.kernel is None:
-            put_rows(stack, [bound.rows(state)], first)
-        first += bound.task.size
+        own = slice(first, first + bound.part.size)
+        if bound.part.kernel is None:
+            stack.A[own], stack.b[own], stack.weights[own] = bound.rows(state)
+        first = own.stop
 
 
 @compiled

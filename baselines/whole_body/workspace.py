@@ -80,12 +80,6 @@ class Workspace(Block):
     tau: Annotated[np.ndarray, "nj"]  # solution, within the limits
     root_wrench: Annotated[np.ndarray, 6]  # solution, about the CoM; zero with a hard root
 
-    @property
-    def N(self) -> np.ndarray:
-        """(nz, nv) rows span the null space of J, or of all its rows but the weakest: the first
-        columns of V."""
-        return self.V[:, : self.first_internal].T
-
 
 def allocate_workspace(
     robot: RobotArrays,

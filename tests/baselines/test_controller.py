@@ -165,7 +165,7 @@ def test_steps_are_moved_through_a_wrapper() -> None:
     """It is not compiled, and the shift is that of the controller inside."""
     inner = load_controller("capture-step", robot())
     assert isinstance(inner, SteppingController)
-    assert inner.step_limits is inner.planner.limits
+    assert inner.step_limits == inner.config.limits
     ends = []
     for controller in (inner, WrappedController(load_controller("capture-step", robot()), robot())):
         env = ResidualStepEnv(robot(), controller=controller, pushes=None)

@@ -32,8 +32,8 @@ FLOORS = """
  5 baselines/motion/graphs/joining, envs/physics/pushes
  6 baselines/motion/graphs, baselines/motion/graphs/matching
  6 baselines/motion/retargeting/inverse_kinematics, envs/physics
- 7 baselines/controller, baselines/whole_body/contacts, baselines/whole_body/limits
- 7 baselines/whole_body/tasks, envs/sensing, envs/viewing
+ 7 baselines/controller, baselines/whole_body/parts, envs/sensing, envs/viewing
+ 8 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance/mdp
  9 baselines/balance/references, baselines/plugins, baselines/walking/models, baselines/whole_body
  9 envs/balance

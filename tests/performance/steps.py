@@ -64,7 +64,7 @@ def main() -> None:
     for name in names:
         agent = load_agent(name, robot)
         steps = defaultdict(list)
-        limit = NStepLimit(PushLimits(robot), agent.env.controller.planner.limits)
+        limit = NStepLimit(PushLimits(robot), agent.env.controller.step_limits)
         for k in range(16):
             angle = 22.5 * k
             sideways = "sideways" if abs(np.sin(np.radians(angle))) > 0.9 else "others"

@@ -41,6 +41,14 @@ class Planner:
         )
         self.foothold_rule, self.further = rule.get("rule", capture_foothold), rule
 
+    @classmethod
+    def of(cls, controller):
+        """That of a controller, which shares feedback and offsets."""
+        made = cls(controller.robot, controller.step_limits, controller.config.foothold)
+        made.region, made.offsets = controller.region, controller.offsets
+        made.feedback = controller.feedback
+        return made
+
     def search(self, state: RobotState) -> Search:
         """The search for steps from a state."""
         return make_search(

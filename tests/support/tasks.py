@@ -9,16 +9,21 @@ from poise.envs.compiled.memory import guarded_zeros
 
 def filled(bound, state):
     """The rows that a task's kernel fills for a state."""
-    k = bound.task.size
+    k = bound.part.size
     arrays = RowArrays(guarded_zeros((k, len(state.qvel))), guarded_zeros(k), guarded_zeros(k))
-    bound.task.kernel(TaskTick(state.arrays, bound.block, arrays))
+    bound.part.kernel(TaskTick(state.arrays, bound.block, arrays))
     return Rows(arrays.A, arrays.b, arrays.weights)
 
 
-def swing_rows(state, sole, reference, axes, task):
-    """The rows of a sole's pose: `reference` (3, 3), sole `axes` (3, 3)."""
+def swing(state, sole, reference, axes, task):
+    """The task of a sole's pose: `reference` (3, 3), sole `axes` (3, 3)."""
     frames = np.array(reference, dtype=float), np.array(axes, dtype=float)
-    return filled(swing_task(sole, *frames, swing_gains(state.robot, task)), state)
+    return swing_task(sole, *frames, swing_gains(state.robot, task))
+
+
+def swing_rows(state, sole, reference, axes, task):
+    """The rows of that task."""
+    return filled(swing(state, sole, reference, axes, task), state)
 
 
 #: kind → a task of the humanoid whose rows have a part of everything

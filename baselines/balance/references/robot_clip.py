@@ -110,8 +110,9 @@ def read_robot_clip(path: str | Path) -> RobotClip:
     Raises:
         ConfigError: no such file, or one that does not hold such postures.
     """
-    arrays = read_arrays(path, ("qpos", "dt"))
     archive = read_archive(path)
+    further = [name for name in (COMMANDS, PLANTED) if f"{name}.npy" in archive.names]
+    arrays = read_arrays(path, ("qpos", "dt", *further))
     with parsing(path):
         about = parse_json(archive.read(ABOUT))
     if not isinstance(about, dict):
@@ -130,25 +131,20 @@ def read_robot_clip(path: str | Path) -> RobotClip:
         frame = int(np.argmax(off))
         raise ConfigError(f"the root's quaternion of frame {frame} has the norm "
                           f"{norms[frame]:.3g}, not 1", source=path, field="qpos")  # fmt: skip
-    if f"{COMMANDS}.npy" in archive.names:
-        commands = read_arrays(path, (COMMANDS,))[COMMANDS]
-        check_commands(commands, str(path))
-        clip = replace(clip, commands=commands)
-    if f"{PLANTED}.npy" in archive.names:
-        planted = _read_planted(path, len(clip.qpos))
+    if COMMANDS in arrays:
+        check_commands(arrays[COMMANDS], str(path))
+        clip = replace(clip, commands=arrays[COMMANDS])
+    if PLANTED in arrays:
+        planted = arrays[PLANTED]
+        if planted.shape != (len(clip.qpos), 2) or not np.isin(planted, (0.0, 1.0)).all():
+            raise ConfigError(
+                f"must be {len(clip.qpos)} rows of two numbers, 1 where a sole is planted, else 0",
+                source=path, field=PLANTED,
+            )  # fmt: skip
+        clip = replace(clip, planted=np.asarray(planted > 0.0))
         if not clip.free:
-            check_planted(planted, str(path))
-        clip = replace(clip, planted=planted)
+            check_planted(clip.planted, str(path))
     return clip
-
-
-def _read_planted(path: str | Path, frames: int) -> np.ndarray:
-    """(F, 2) bool."""
-    planted = read_arrays(path, (PLANTED,))[PLANTED]
-    if planted.shape != (frames, 2) or not np.isin(planted, (0.0, 1.0)).all():
-        raise ConfigError(f"must be {frames} rows of two numbers, 1 where a sole is planted, else "
-                          "0", source=path, field=PLANTED)  # fmt: skip
-    return np.asarray(planted > 0.0)
 
 
 def reference_from(

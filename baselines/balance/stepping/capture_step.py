@@ -1,13 +1,12 @@
 """Feet in place as long as that holds; then steps to where the capture point can be stopped."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from poise.baselines.controller import CompiledController, Outputs, Targets
-from poise.baselines.solvers.problem import Solver
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.gains import COMPILED_SOLVER, MomentumQPConfig
@@ -35,18 +34,16 @@ from .planning.units import in_si
 from .tick import capture_tick
 
 
-def check_qps(config: CaptureStepConfig, **further: MomentumQPConfig) -> None:
-    """Raises ConfigError for what the QPs of a controller that steps cannot be.
-
-    `further` ones have the name of their field, with a double underscore for a point.
-    """
-    stepping = {"step_qp": config.step_qp, **further}
+def check_qps(
+    config: CaptureStepConfig, further: Mapping[str, MomentumQPConfig] | None = None
+) -> None:
+    """Raises ConfigError for what the QPs of a controller that steps, and `further` ones by the
+    name of their field, cannot be."""
+    stepping = {"step_qp": config.step_qp, **(further or {})}
     for name, qp in {"qp": config.qp, **stepping}.items():
-        name = name.replace("__", ".")
         if qp.root != "hard":
             raise ConfigError(f"must be 'hard', not {qp.root!r}", field=f"{name}.root")
     for name, qp in stepping.items():
-        name = name.replace("__", ".")
         if qp.solver != COMPILED_SOLVER:
             raise ConfigError(
                 f"must be {COMPILED_SOLVER!r}, not {qp.solver!r}", field=f"{name}.solver"
@@ -55,23 +52,6 @@ def check_qps(config: CaptureStepConfig, **further: MomentumQPConfig) -> None:
             raise ConfigError(
                 f"must be that of qp, {config.qp.period}, not {qp.period}", field=f"{name}.period"
             )
-
-
-def step_gains(
-    robot: Robot,
-    config: CaptureStepConfig,
-    period: float,
-    rest_ahead: float = 0.0,
-    steps: bool = True,
-) -> StepGains:
-    """The gains of `config` for one robot, whose controller ticks every `period` [s].
-
-    `rest_ahead` [m] as of `StepGains`; without `steps` no fall is a reason for one.
-    """
-    numbers = in_si(StepGains, config, robot.units)
-    if not steps:
-        numbers["step_margin"] = np.inf
-    return StepGains(**numbers, rest_ahead=rest_ahead, period=period)
 
 
 def allocate_step_memory(region: CopRegion) -> StepMemory:
@@ -111,7 +91,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         c = self.config
         self._step_limits = possible_limits(robot, c.limits, c.swing, c.step_qp.torque.share)
         self.offsets = StepOffsets()  #: what a policy adds
-        self._feedback = feedback_arrays(robot, c.feedback, c.falls, c.pivot)
+        self.feedback = feedback_arrays(robot, c.feedback, c.falls, c.pivot)
         self._swing = swing_at(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)
         self.memory = allocate_step_memory(self.region)
@@ -134,16 +114,6 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         """(nv,) accelerations that the last torques are to bring."""
         asked = self._tick is not None and self._tick.to_python[0]
         return self.qp.vdot if asked else self._vdot.copy()
-
-    @property
-    def solver(self) -> Solver | None:
-        """The solver of the QP with feet in place, or None where it is the compiled one."""
-        return self.qp.solver
-
-    @property
-    def parameters(self) -> QPParameters:
-        """The gains of the QP with feet in place."""
-        return self.qp.parameters
 
     @property
     def step_limits(self) -> StepLimits | None:
@@ -181,11 +151,6 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def steps(self) -> int:
         """The number of steps begun since the reset."""
         return int(self.memory.steps[0])
-
-    @property
-    def stepped(self) -> bool:
-        """True once a step has begun since the reset."""
-        return self.steps > 0
 
     @property
     def foot(self) -> int:
@@ -227,6 +192,9 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         if self._reference_out is None:
             self._reference_out = Targets.standing(self.robot, state)
         s, asked, region = state.arrays, self._reference_out.arrays(), self.region
+        numbers = in_si(StepGains, self.config, self.robot.units)
+        if self._step_limits is None:
+            numbers["step_margin"] = np.inf  # no fall is a reason for a step
         ticks = bind_swings(
             self.sets, s, asked, self.config.swing, self._swing.reference, self.memory.level_frame
         )
@@ -236,12 +204,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             state=s,
             reference_in=targets.arrays(),
             reference_out=asked,
-            gains=step_gains(
-                self.robot,
-                self.config,
-                self.period,
-                rest_ahead(self.robot, region),
-                self._step_limits is not None,
+            gains=StepGains(
+                **numbers, rest_ahead=rest_ahead(self.robot, region), period=self.period
             ),
             search=self._search(s),
             swing=self._swing,
@@ -263,7 +227,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         if known is not None and known.state is s:
             return known.search
         return make_search(
-            self.robot, s, self.region, self._step_limits or c.limits, c.foothold, self._feedback,
+            self.robot, s, self.region, self._step_limits or c.limits, c.foothold, self.feedback,
             self.offsets.values, self.foothold_rule, self._arc,
         )  # fmt: skip
 

@@ -36,7 +36,7 @@ class MotionStep(CaptureStep):
     def __init__(self, robot: Robot, config: MotionStepConfig | None = None):
         config = config or MotionStepConfig()
         prepare("contacts", "planner", "performing")
-        check_qps(config, perform__qp=config.perform.qp)
+        check_qps(config, {"perform.qp": config.perform.qp})
         self.perform_sets = ContactSets(
             robot, config.perform.qp, config.perform.torque_rate_limit
         )  # fmt: skip

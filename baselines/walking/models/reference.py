@@ -11,7 +11,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from poise.baselines.whole_body.tasks.task import BoundTask, Rows, Task, TaskTick
+from poise.baselines.whole_body.parts.part import Bound
+from poise.baselines.whole_body.tasks.task import Rows, Task, TaskTick
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block, Integer, Number
 from poise.envs.compiled.calls import Program
@@ -30,7 +31,6 @@ class Reference(Block):
     """What a model is told, and what it answers; legs in the order of the soles."""
 
     legs: LegArrays
-    mass: float  # m [kg]
     gravity: float  # g [m/s²]
     period: float  # of a tick [s]
     begun: Integer  # 0 in the first tick of a walk
@@ -96,9 +96,7 @@ def row_gains(weights: RowWeights, units: Units) -> RowGains:
 
 def allocate_reference(robot: Robot, period: float, legs: LegArrays) -> Reference:
     """The reference of a robot that has not walked."""
-    return Reference.allocate(
-        legs=legs, mass=float(robot.mass), gravity=float(robot.units.gravity), period=period
-    )
+    return Reference.allocate(legs=legs, gravity=float(robot.units.gravity), period=period)
 
 
 @compiled
@@ -199,6 +197,6 @@ class LegRows(Task[LegRowsBlock]):
         return Rows(A, asked[:, 0], asked[:, 1])
 
 
-def leg_task(leg: int, reference: Reference) -> BoundTask:
+def leg_task(leg: int, reference: Reference) -> Bound[Task]:
     """The task of the QP for one leg."""
-    return BoundTask(LegRows(), LegRowsBlock(leg, reference))
+    return Bound(LegRows(), LegRowsBlock(leg, reference))

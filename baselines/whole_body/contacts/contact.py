@@ -1,21 +1,17 @@
 """Contacts of the momentum QP: points in contact, and the Jacobian of these and the soles."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Generic, NamedTuple, TypeVar
+from typing import ClassVar, Generic, NamedTuple
 
 import numpy as np
 
-from poise.configs.errors import below
-from poise.configs.kinds import OfKind
+from poise.baselines.whole_body.parts.part import B, Bound, Part
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
-from poise.envs.robots.robot import Robot
-
-B = TypeVar("B", bound=Block)
 
 
 class ContactRows(NamedTuple):
@@ -53,21 +49,12 @@ class PointTick(Block, Generic[B]):
 
 
 @dataclass(frozen=True)
-class Contact(OfKind, Generic[B]):
-    """Base of contacts other than those of the feet: a point with a force that has a cone.
-
-    A subclass is a frozen dataclass with a `kind` to be named by. `bind` makes the block that it
-    works on, whose `chain` names the degrees of freedom that move the point. `rows` is the
-    specification; `kernel`, a compiled function of a `PointTick`, fills the same.
-    """
+class Contact(Part[B]):
+    """Base of contacts other than those of the feet, see `Part`: a point with a force that has a
+    cone. `rows` is the specification; `kernel`, of a `PointTick`, fills the same."""
 
     room: ClassVar[str] = str(__package__)
     cone_rows: ClassVar[int]  #: of `cone`
-    kernel: ClassVar[Callable[..., None]]  #: as `staticmethod(compiled function)`
-
-    def bind(self, robot: Robot) -> B:
-        """The block of this contact for a robot."""
-        raise NotImplementedError
 
     def chain(self, block: B) -> np.ndarray:
         """The degrees of freedom that move the point."""
@@ -76,34 +63,6 @@ class Contact(OfKind, Generic[B]):
     def rows(self, state: RobotState, block: B) -> ContactRows:
         """Motion, cone and load in NumPy."""
         raise NotImplementedError
-
-
-class BoundContact(NamedTuple, Generic[B]):
-    """A contact, and the block that it works on for one robot."""
-
-    contact: Contact[B]
-    block: B
-
-    @property
-    def chain(self) -> np.ndarray:
-        """The degrees of freedom that move the point."""
-        return self.contact.chain(self.block)
-
-    def rows(self, state: RobotState) -> ContactRows:
-        """The rows of a state."""
-        return self.contact.rows(state, self.block)
-
-
-def bind_contacts(contacts: Mapping[str, Contact], robot: Robot) -> dict[str, BoundContact]:
-    """The contacts of a configuration for one robot.
-
-    Raises ConfigError naming the contact for a body that the robot does not have.
-    """
-    bound = {}
-    for name, contact in contacts.items():
-        with below("contacts", name):
-            bound[name] = BoundContact(contact, contact.bind(robot))
-    return bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +79,7 @@ class ContactArrays(Block):
 
 def contact_arrays(
     state: StateArrays,
-    points: Sequence[BoundContact] = (),
+    points: Sequence[Bound[Contact]] = (),
     accel: np.ndarray | None = None,
     weights: np.ndarray | None = None,
     force: np.ndarray | None = None,
@@ -131,7 +90,7 @@ def contact_arrays(
         accel, weights, force: (k,) of a workspace, into which the points write.
     """
     soles, nv = state.J.shape
-    ends = np.cumsum([0, *(each.contact.cone_rows for each in points)])
+    ends = np.cumsum([0, *(contact.cone_rows for contact, _ in points)])
     J = guarded_zeros((soles + 3 * len(points), nv)) if points else state.J
     positions, cone = guarded_zeros((len(points), 3)), guarded_zeros((int(ends[-1]), 3))
     bound = guarded_zeros(len(cone))

@@ -1,20 +1,15 @@
 """Tasks of the momentum QP: rows of ½ Σ weights (A v̇ − b)² from gains without units."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Generic, NamedTuple, TypeVar
+from typing import ClassVar, Generic, NamedTuple
 
 import numpy as np
 
-from poise.configs.errors import below
-from poise.configs.kinds import OfKind
+from poise.baselines.whole_body.parts.part import B, Part
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
-from poise.envs.robots.robot import Robot
-
-B = TypeVar("B", bound=Block)
 
 
 class Rows(NamedTuple):
@@ -44,49 +39,19 @@ class TaskTick(Block, Generic[B]):
 
 
 @dataclass(frozen=True)
-class Task(OfKind, Generic[B]):
-    """Base of tasks. A subclass is a frozen dataclass of gains, with a `kind` to be named by.
+class Task(Part[B]):
+    """Base of tasks, see `Part`. Their blocks have gains and a reference.
 
-    Gains have no units (see `gains.py`). `bind` makes the block that the task works on: gains in
-    SI units, and a reference that may be written to at any time. `rows` is the specification.
-    `kernel`, a compiled function of a `TaskTick`, fills the same rows; without one the controller
-    calls `rows`, and runs from Python.
+    `rows` is the specification. `kernel`, of a `TaskTick`, fills the same rows; without one the
+    controller calls `rows`, and runs from Python.
     """
 
     room: ClassVar[str] = str(__package__)
     size: ClassVar[int]  #: rows
-    kernel: ClassVar[Callable[..., None] | None] = None  #: as `staticmethod(compiled function)`
-
-    def bind(self, robot: Robot) -> B:
-        """The block of this task for a robot."""
-        raise NotImplementedError
 
     def rows(self, state: RobotState, block: B) -> Rows:
         """`size` rows in v̇, in NumPy."""
         raise NotImplementedError
-
-
-class BoundTask(NamedTuple, Generic[B]):
-    """A task, and the block that it works on for one robot."""
-
-    task: Task[B]
-    block: B
-
-    def rows(self, state: RobotState) -> Rows:
-        """The rows of a state."""
-        return self.task.rows(state, self.block)
-
-
-def bind_tasks(tasks: Mapping[str, Task], robot: Robot) -> dict[str, BoundTask]:
-    """The tasks of a configuration for one robot.
-
-    Raises ConfigError naming the task for a body or a point that the robot does not have.
-    """
-    bound = {}
-    for name, task in tasks.items():
-        with below("tasks", name):
-            bound[name] = BoundTask(task, task.bind(robot))
-    return bound
 
 
 def spring(units: Units, stiffness: float, damping_ratio: float) -> tuple[float, float]:

@@ -98,7 +98,7 @@ def test_threads_do_not_share_anything():
 def test_the_foothold_moves_by_what_is_added(env):
     """Seen where the step begins, for the foot and the time that are planned."""
     play(env, until=swinging)
-    planner, state = env.controller.planner, env.simulation.state
+    planner, state = planned.Planner.of(env.controller), env.simulation.state
     plan = planned.plan(planner, state, 0.0)
     start = state.sole_points[plan.foot, :2]
 
@@ -114,10 +114,11 @@ def test_the_foothold_stays_within_the_limits_of_a_step(env):
     """However far it is pulled across: the feet keep their least width."""
     play(env, until=swinging)
     controller, state = env.controller, env.simulation.state
-    foot, side = controller.foot, controller.planner.foot_sign[controller.foot]
+    planner, foot = planned.Planner.of(controller), controller.foot
+    side = planner.foot_sign[foot]
     controller.offsets.foothold[1] = -1e20 * side
     start = state.sole_points[foot, :2]
-    footholds, _ = planned.footholds(controller.planner, state, foot, 0.0, np.array([9.0]), start)
+    footholds, _ = planned.footholds(planner, state, foot, 0.0, np.array([9.0]), start)
     width = side * (footholds[0] - state.sole_points[1 - foot, :2])[1]
     least = controller.config.limits.width_min * controller.robot.height_com
     assert width == pytest.approx(least, abs=1e-9)
@@ -201,7 +202,7 @@ def test_observation_tells_of_the_step():
     ):
         found = [seen[f"{term}.x"], seen[f"{term}.y"]]
         np.testing.assert_allclose(found, (point - stance[:2]) @ axes / half, atol=1e-9)
-    play(env, until=lambda env: env.controller.stepped and not swinging(env))
+    play(env, until=lambda env: env.controller.steps and not swinging(env))
     seen = dict(zip(names, env.episode.observation, strict=True))
     assert seen["swing.left"] == seen["swing.right"] == seen["foothold.x"] == 0.0
     assert seen["feet.y"] > 0.1 / half

@@ -8,8 +8,9 @@ import numpy as np
 
 from poise.baselines.controller import TargetArrays
 from poise.baselines.whole_body.contact_sets import ContactSets
+from poise.baselines.whole_body.parts.part import Bound
 from poise.baselines.whole_body.tasks.sole_pose import SolePose, SolePoseBlock, SolePoseGains
-from poise.baselines.whole_body.tasks.task import BoundTask
+from poise.baselines.whole_body.tasks.task import Task
 from poise.envs.compiled.block import Block, Number
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import Units
@@ -87,7 +88,7 @@ def aim_swing(w: Swing, x: float, y: float, duration: float) -> None:
 
 
 @compiled
-def _lead(
+def lead(
     reference: np.ndarray, a: int, position: float, velocity: float, duration: float, dt: float
 ) -> None:
     """Move axis `a` of the reference `dt` further on its way to a place and a speed."""
@@ -103,14 +104,14 @@ def advance_over(w: Swing, apex: float, dt: float) -> None:
     rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
     for a in range(2):
         if rest > dt:
-            _lead(now, a, w.foothold[a], 0.0, rest, dt)
+            lead(now, a, w.foothold[a], 0.0, rest, dt)
         else:
             now[0, a], now[1, a], now[2, a] = w.foothold[a], 0.0, 0.0
     lift = w.lift * w.duration[0]
     if w.time[0] + dt < lift:
-        _lead(now, 2, ground + apex, 0.0, lift - w.time[0], dt)
+        lead(now, 2, ground + apex, 0.0, lift - w.time[0], dt)
     elif rest > dt:
-        _lead(now, 2, ground, -speed, rest, dt)
+        lead(now, 2, ground, -speed, rest, dt)
     else:
         now[0, 2], now[1, 2], now[2, 2] = now[0, 2] - speed * dt, -speed, 0.0
     w.time[0] += dt
@@ -150,9 +151,9 @@ def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:
 
 def swing_task(
     sole: int, reference: np.ndarray, axes: np.ndarray, gains: SolePoseGains
-) -> BoundTask:
+) -> Bound[Task]:
     """The task of the QP that moves a sole along `reference` (3, 3), its `axes` (3, 3) fixed."""
-    return BoundTask(SolePose(), SolePoseBlock(sole, reference, axes, gains))
+    return Bound(SolePose(), SolePoseBlock(sole, reference, axes, gains))
 
 
 def bind_swings(
@@ -162,7 +163,7 @@ def bind_swings(
     task: SwingTask,
     way: np.ndarray,
     axes: np.ndarray,
-    legs: Sequence[BoundTask] = (),
+    legs: Sequence[Bound[Task]] = (),
 ) -> dict[str, Any]:
     """The ticks of `CaptureTick` on the first sole, on the second one and on both.
 
@@ -173,6 +174,6 @@ def bind_swings(
     ticks = {}
     for name, soles, swinging in SUPPORTS:
         tasks = [swing_task(foot, way, axes, gains) for foot in swinging]
-        tasks += [legs[leg] for leg in soles if legs]
-        ticks[name] = sets.sets[soles].bind(state, targets, sets, tasks)
+        tasks += [legs[leg] for leg in soles] if legs else []
+        ticks[name] = sets.bind(soles, state, targets, tasks)
     return ticks

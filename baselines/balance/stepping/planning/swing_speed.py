@@ -92,7 +92,8 @@ def highest_lift(robot: Robot) -> float:
     its joints' ranges, to 1 mm [m]."""
 
     def possible(height: float) -> bool:
-        return all(_lifts(robot, sole, height) for sole in range(len(robot.soles)))
+        ways = [_lift(robot, sole, height, level=False) for sole in range(len(robot.soles))]
+        return all(way is not None for way in ways)
 
     return highest(possible, robot.height_com)
 
@@ -109,25 +110,6 @@ def highest(possible: Callable[[float], bool], high: float) -> float:
     return low
 
 
-def _lifts(robot: Robot, sole: int, clearance: float) -> bool:
-    """Whether the leg's joints, within their ranges, lift the sole by `clearance`, level or not."""
-    model, data, dofs = robot.model, standing_data(robot), _leg_dofs(robot, sole)
-    low, high = robot.joint_range[dofs - 6].T
-    goal = sole_pose(data, robot.soles[sole])[0] + [0.0, 0.0, clearance]
-    for _ in range(ROUNDS):
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        off = goal - sole_pose(data, robot.soles[sole])[0]
-        if np.abs(off).max() < NEAR:
-            return True
-        place, rows = data.qpos[dofs + 1], _jacobian(robot, data, sole, dofs)[:3]
-        rows = rows * ((low < place) & (place < high))  # what is at its end stays there
-        change = np.linalg.lstsq(rows, off, rcond=1e-4)[0]
-        change *= min(1.0, STEP / max(np.abs(change).max(), STEP))
-        data.qpos[dofs + 1] = np.clip(place + change, low, high)
-    return False
-
-
 def _leg_dofs(robot: Robot, sole: int) -> np.ndarray:
     """(n,) degrees of freedom of the joints between the root and a sole."""
     chain = dof_chain(robot.model, robot.soles[sole].body_id)
@@ -136,8 +118,8 @@ def _leg_dofs(robot: Robot, sole: int) -> np.ndarray:
 
 def _foot_speed(robot: Robot, sole: int, clearance: float, share: float) -> SwingSpeed:
     """The speeds of one foot."""
+    way = _lift(robot, sole, clearance, level=True)
     data, dofs = standing_data(robot), _leg_dofs(robot, sole)
-    way = _lift(robot, data, sole, dofs, clearance)
     fastest = _joint_speeds(robot, data, dofs, share) / PEAK
     rows = _jacobian(robot, data, sole, dofs)
     lift = np.inf
@@ -159,23 +141,30 @@ def _joint_speeds(robot: Robot, data: mujoco.MjData, dofs: np.ndarray, share: fl
         return np.where(left > 0.0, left / model.dof_damping[dofs], 0.0)
 
 
-def _lift(
-    robot: Robot, data: mujoco.MjData, sole: int, dofs: np.ndarray, clearance: float
-) -> np.ndarray | None:
-    """(n,) the way of the leg's joints that lifts the level sole; None if none is found."""
+def _lift(robot: Robot, sole: int, clearance: float, level: bool) -> np.ndarray | None:
+    """(n,) the way of the leg's joints that lifts the sole by `clearance`; None if none is found.
+
+    It stays `level`, whatever the joints' ranges, or they keep to these, whatever it turns.
+    """
+    model, data, dofs = robot.model, standing_data(robot), _leg_dofs(robot, sole)
+    low, high = robot.joint_range[dofs - 6].T
     start = data.qpos[dofs + 1].copy()
     goal = sole_pose(data, robot.soles[sole])[0] + [0.0, 0.0, clearance]
     for _ in range(ROUNDS):
-        mujoco.mj_kinematics(robot.model, data)
-        mujoco.mj_comPos(robot.model, data)
-        place = sole_pose(data, robot.soles[sole])[0]
-        if np.abs(goal - place).max() < CLOSE:
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        off = goal - sole_pose(data, robot.soles[sole])[0]
+        if np.abs(off).max() < (CLOSE if level else NEAR):
             return data.qpos[dofs + 1] - start
-        rows = _jacobian(robot, data, sole, dofs)
-        rows[ROLL:] *= 0.1 * robot.height_com  # a leg that cannot keep the sole level turns it
-        wanted = np.concatenate([goal - place, np.zeros(3)])
-        change = np.linalg.lstsq(rows, wanted, rcond=1e-4)[0]
-        data.qpos[dofs + 1] += change * min(1.0, STEP / max(np.abs(change).max(), STEP))
+        place, rows = data.qpos[dofs + 1], _jacobian(robot, data, sole, dofs)
+        if level:
+            rows[ROLL:] *= 0.1 * robot.height_com  # a leg that cannot keep the sole level turns it
+            off = np.concatenate([off, np.zeros(3)])
+        else:
+            rows = rows[:3] * ((low < place) & (place < high))  # what is at its end stays there
+        change = np.linalg.lstsq(rows, off, rcond=1e-4)[0]
+        place = place + change * min(1.0, STEP / max(np.abs(change).max(), STEP))
+        data.qpos[dofs + 1] = place if level else np.clip(place, low, high)
     return None
 
 

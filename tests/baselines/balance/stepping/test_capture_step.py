@@ -163,7 +163,7 @@ def test_a_foot_gives_its_load_away_before_it_lifts_off():
 
     def look(c, *_):
         unloading = c.swing is not None and c.swing.time[0] == 0.0
-        return c.sets.workspace.wrenches[6 * c.foot + 2] if unloading else np.nan
+        return c.sets.sets[0, 1].workspace.wrenches[6 * c.foot + 2] if unloading else np.nan
 
     controller = load_controller("capture-step", robot())
     loads = np.array(watched(controller, 24.0, 0.0, look, duration=0.6))
@@ -179,7 +179,7 @@ def test_hips_that_are_used_up_bring_the_step_forward():
     for gain in (0.0, 0.5):
         settings = {**to_dict(controller_config("capture-step")), "momentum_gain": gain}
         controller = load_controller(settings, robot())
-        begun.append(watched(controller, 24.0, 0.0, lambda c, *_: c.stepped, 0.6).index(True))
+        begun.append(watched(controller, 24.0, 0.0, lambda c, *_: c.steps > 0, 0.6).index(True))
     assert begun[1] < begun[0]
 
 
@@ -197,10 +197,10 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
     controller, kinds = load_controller(name, robot()), set()
     regions, stood, raised, left, stages = controller.region, [], [0.0], [np.inf], [0]
     steps = [0]
-    planner = readable.ReadablePlanner(controller.planner)
+    planner = readable.ReadablePlanner(planned.Planner.of(controller))
 
     def look(c, state, targets, tau):
-        if not c.stepped:
+        if not c.steps:
             return
         yaw, feet = np.arctan2(*c.memory.level_frame[1::-1, 0]), state.sole_points
         if c.swing is not None:
@@ -212,7 +212,7 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             region, overreach = planned.alone(regions, stance, feet[stance], yaw), 0.0
             ground, stride = feet[stance, 2], c.swing.foothold - feet[stance, :2]
             if left[0] > readable.FROZEN:  # the last ticks keep what was fed back
-                planner.phase = c.planner.feedback.signals[PHASE]
+                planner.phase = c.feedback.signals[PHASE]
                 raised[0] = planner.added(state, c.foot, yaw)[3]
             left[0] = time_left(c.swing)
         else:
@@ -244,10 +244,10 @@ def test_a_copy_is_a_controller_of_its_own():
     """Pickled or copied after a step it plays the same trial, and leaves the original alone."""
     _, env = trial("capture-step", 22.0, 180.0, duration=0.6)
     original, end = env.controller, env.simulation.data.qpos.copy()
-    assert original.stepped
+    assert original.steps
     memory = [array.copy() for array in original.memory.members()]
     for twin in (copy.deepcopy(original), pickle.loads(pickle.dumps(original))):
-        assert twin.stepped and twin.steps == original.steps
+        assert twin.steps and twin.steps == original.steps
         _, other = trial(twin, 22.0, 180.0, duration=0.6)
         np.testing.assert_array_equal(other.simulation.data.qpos, end)
     for array, before in zip(original.memory.members(), memory, strict=True):
@@ -299,9 +299,9 @@ def test_another_solver_holds_the_feet_in_place():
 def test_replicas_start_anew():
     """After a reset nothing of the last trial is left."""
     _, env = trial("capture-step", 22.0, 180.0, duration=1.0)
-    assert env.controller.stepped
+    assert env.controller.steps
     env.controller.reset(env.simulation.state)
-    assert not env.controller.stepped and env.controller.swing is None
+    assert not env.controller.steps and env.controller.swing is None
     assert env.controller.steps == env.controller.failures == 0
 
 

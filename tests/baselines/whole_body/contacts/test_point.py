@@ -13,14 +13,14 @@ from poise.baselines.whole_body.contacts.contact import (
     ContactRowArrays,
     ContactRows,
     PointTick,
-    bind_contacts,
 )
 from poise.baselines.whole_body.contacts.point import PointContact, force_cone
 from poise.baselines.whole_body.formulation import build, torques_of, unknowns
+from poise.baselines.whole_body.parts.part import bind_parts
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.simulation import Simulation
-from poise.envs.physics.state import RobotState
+from tests.support import contact_sets
 from tests.support.physics import random_state, robot_named
 from tests.support.wall import contact_described, reaching, robot_at_a_wall, wall_force
 
@@ -64,7 +64,7 @@ def test_the_kernel_fills_the_rows_that_NumPy_has():
     robot = robot_named("humanoid")
     normal = [0.3, -0.8, 0.5]
     config = PointContact("left_lower_arm", tuple(normal), (0.1, 0.2, 0.3), force=0.1)
-    (contact,) = bind_contacts({"hand": config}, robot).values()
+    (contact,) = bind_parts({"hand": config}, robot, "contacts").values()
     nv = robot.model.nv
     for seed in range(4):
         simulation = Simulation(robot)
@@ -207,16 +207,15 @@ def test_controllers_that_step_have_contacts_in_every_contact_set(soles):
     sets = CaptureStep(robot, config).sets
     _, state, targets, _ = after(qp, 0.4)
     points = [contact.rows(state) for contact in sets.contacts.values()]
-    sets.tick(state, targets, soles)
-    chosen = sets.sets[soles]
-    restricted = RobotState(chosen.arrays, chosen.state(state.arrays))
+    _, ws = contact_sets.tick(sets, state, targets, soles)
+    chosen, restricted = sets.sets[soles], contact_sets.restricted(sets, state, targets, soles)
     cop_vel = chosen.workspace.cop_vel
     readable = build(restricted, targets, chosen.parameters, cop_vel, points=points)
     solution = make_solver("daqp").solve(readable)
     assert solution.solved and sets.failures == 0
     vdot, w, _ = unknowns(restricted, solution.x, points)
     np.testing.assert_allclose(chosen.workspace.vdot, vdot, atol=1e-6 * np.abs(vdot).max())
-    force = sets.forces["hand"]
+    force = ws.wrenches[-3:]
     np.testing.assert_allclose(force, w[-3:], atol=1e-6 * np.abs(w).max())
     assert 1.0 < NORMAL @ force <= 0.05 * robot.units.force * (1.0 + 1e-9)
     np.testing.assert_allclose(points[0].J @ chosen.workspace.vdot, points[0].accel, atol=1e-6)

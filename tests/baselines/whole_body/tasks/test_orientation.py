@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines import MomentumQP, Targets
 from poise.baselines.registry import controller_config
+from poise.baselines.whole_body.parts.part import bind_parts
 from poise.baselines.whole_body.tasks.orientation import Orientation
-from poise.baselines.whole_body.tasks.task import bind_tasks
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import robot_named
 from tests.support.shared import generic_state
@@ -18,7 +18,7 @@ ROBOT = robot_named("humanoid")
 
 def bound(**gains):
     """The task of the torso."""
-    return bind_tasks({"trunk": Orientation("torso", **gains)}, ROBOT)["trunk"]
+    return bind_parts({"trunk": Orientation("torso", **gains)}, ROBOT, "tasks")["trunk"]
 
 
 def test_standing_is_what_it_wants():

@@ -5,8 +5,8 @@ import pytest
 
 from poise.baselines import MomentumQP, Targets
 from poise.baselines.registry import controller_config
+from poise.baselines.whole_body.parts.part import bind_parts
 from poise.baselines.whole_body.tasks.position import Position
-from poise.baselines.whole_body.tasks.task import bind_tasks
 from poise.envs.physics.body_points import point_motion
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import robot_named
@@ -19,7 +19,7 @@ HAND = {"body": "right_lower_arm", "point": (0.18, 0.18, 0.18)}
 
 def bound(**gains):
     """The task of the right hand."""
-    return bind_tasks({"hand": Position(**HAND, **gains)}, ROBOT)["hand"]
+    return bind_parts({"hand": Position(**HAND, **gains)}, ROBOT, "tasks")["hand"]
 
 
 @pytest.mark.parametrize("frame", ["heading", "com"])

@@ -9,8 +9,9 @@ from poise.baselines.controller import Targets
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.solvers import make_solver, residuals
 from poise.baselines.whole_body.formulation import build, torques_of, unknowns
+from poise.baselines.whole_body.parts.part import bind_parts
 from poise.baselines.whole_body.tasks.orientation import Orientation
-from poise.baselines.whole_body.tasks.task import Task, bind_tasks
+from poise.baselines.whole_body.tasks.task import Task
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build as build_config
 from poise.configs.schema import to_dict
@@ -32,7 +33,7 @@ def config(*names, **changes):
 
 def bound(kind, **changes):
     """An example for the humanoid."""
-    return bind_tasks(config(kind, **changes).tasks, robot_named("humanoid"))[kind]
+    return bind_parts(config(kind, **changes).tasks, robot_named("humanoid"), "tasks")[kind]
 
 
 def flying(seed):

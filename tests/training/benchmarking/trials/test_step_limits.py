@@ -106,7 +106,7 @@ def test_without_a_planner_it_is_who_steps_that_counts(limit: NStepLimit) -> Non
     come after what a planner says."""
     own = StepLimits(speed=0.4)
     controller = load_controller("capture-step", robot())
-    controller.planner.limits = own
+    controller._step_limits = own
     planner = ResidualBalanceEnv(robot(), controller=controller)
     cases = [stander("often", 10), stander("rare", 1), stander("tilts", 10, False)]
     cases.append((Agent("planned", planner, np.asarray, ""), []))

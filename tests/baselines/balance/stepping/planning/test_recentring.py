@@ -108,7 +108,7 @@ def test_foothold_home(shift):
     controller = load_controller("feedback-step", robot())
     state, planner, recentring = (
         moved_state(controller, shift),
-        controller.planner,
+        planned.Planner.of(controller),
         controller.recentring,
     )
     q = planner.search(state)

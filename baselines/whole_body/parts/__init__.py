@@ -1,0 +1,1 @@
+"""What tasks, contacts and limits of the momentum QP have in common."""
