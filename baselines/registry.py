@@ -3,18 +3,14 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from poise.baselines.balance.in_place.guided import (
-    LQRLIP,
-    CapturePoint,
-    CapturePointConfig,
-    LQRLIPConfig,
-)
+from poise.baselines.balance.in_place.capture_point import CapturePoint, CapturePointConfig
 from poise.baselines.balance.in_place.jacobian_transpose import (
     JacobianTranspose,
     JacobianTransposeConfig,
 )
 from poise.baselines.balance.in_place.kudoh02 import Kudoh02, Kudoh02Config
 from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
+from poise.baselines.balance.in_place.lqr_lip import LQRLIP, LQRLIPConfig
 from poise.baselines.balance.in_place.macchietto09 import Macchietto09, Macchietto09Config
 from poise.baselines.balance.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
 from poise.baselines.balance.stepping.capture_step import CaptureStep

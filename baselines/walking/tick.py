@@ -248,9 +248,8 @@ def gait_tick(t: WalkTick) -> bool:
 
 @compiled
 def walk_tick(t: WalkTick) -> None:
-    """One tick of `Walk`: `tau` holds torques, unless `to_python` says that Python must."""
+    """One tick of `Walk`: `tau` then holds torques."""
     g = t.gait
-    t.capture.to_python[0] = 0
     if not g.walking[0] and is_commanded(g) and not t.capture.memory.swinging[0]:
         start_walking(t)
     if not g.walking[0] or not gait_tick(t):

@@ -10,7 +10,6 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from poise.baselines.controller import TargetArrays
-from poise.configs.errors import ConfigError
 from poise.envs.compiled.calls import address_of
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
@@ -33,7 +32,6 @@ class ContactSet(Copyable):
     """A subset of the soles: the robot with these alone, its parameters and scratch."""
 
     index: int
-    pick: np.ndarray  # (nc,) int: the soles, in order
     arrays: RobotArrays
     parameters: QPParameters
     workspace: Workspace
@@ -49,9 +47,6 @@ class ContactSets(BoundQP):
 
     def __init__(self, robot: Robot, config: MomentumQPConfig, torque_rate_limit: float = np.inf):
         super().__init__(robot, config)
-        for name, (task, _) in self.tasks.items():
-            if task.kernel is None:
-                raise ConfigError("has no kernel", field=f"tasks.{name}")
         limit, count = self.parameters.torque_limit, len(robot.soles)
         self.slew = np.where(limit > 0.0, torque_rate_limit * limit, np.inf)
         self.applied = guarded_zeros(len(limit))  # torques of the last tick, if
@@ -65,14 +60,14 @@ class ContactSets(BoundQP):
         self.sets = {soles: self._set(index, soles) for index, soles in enumerate(subsets)}
 
     def _set(self, index: int, soles: tuple[int, ...]) -> ContactSet:
-        pick = np.array(soles)
+        pick = list(soles)
         names = [item.name for item in fields(RobotArrays)]
         names = [name for name in names if name.startswith(("sole_", "chain"))]
         picked = {name: getattr(self.arrays, name)[pick] for name in names}
         arrays = replace(self.arrays, **picked)
         cone = self.parameters.cone[pick]  # with a row more for each sole: the bound on its load
         p = replace(self.parameters, cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
-        return ContactSet(index, pick, arrays, p, self.new_workspace(arrays, p))
+        return ContactSet(index, arrays, p, self.new_workspace(arrays, p))
 
     def reset(self) -> None:
         """Forget the last trial."""
@@ -88,17 +83,16 @@ class ContactSets(BoundQP):
     ) -> ContactTick:
         """What a tick with these soles works on from `s`; its stack has the tasks of the
         configuration, then `tasks`."""
-        chosen, nv, nc = self.sets[soles], len(s.qvel), len(soles)
+        chosen = self.sets[soles]
+        feet, rows = slice(soles[0], soles[-1] + 1), slice(6 * soles[0], 6 * soles[-1] + 6)
         own = replace(
-            s, J=guarded_zeros((6 * nc, nv)), J_v=guarded_zeros(6 * nc),
-            Jdot_v=guarded_zeros(6 * nc), sole_point=guarded_zeros((nc, 3)),
-            sole_axes=guarded_zeros((nc, 3, 3)), origin=guarded_zeros(3),
-            contacts=guarded_zeros(nc),
+            s, J=s.J[rows], J_v=s.J_v[rows], Jdot_v=s.Jdot_v[rows], sole_point=s.sole_point[feet],
+            sole_axes=s.sole_axes[feet], contacts=s.contacts[feet], origin=guarded_zeros(3),
         )  # fmt: skip
         ws = chosen.workspace
         problem = self.new_assembly(chosen.arrays, own, chosen.parameters, targets, ws, s, tasks)
         return ContactTick.allocate(
-            {"nc": nc}, source=s, pick=chosen.pick, problem=problem, memory=self.memory,
+            {"nc": len(soles)}, problem=problem, memory=self.memory,
             applied=self.applied, slew=self.slew, follows=self.follows, chosen=self.chosen,
             index=chosen.index, assemble=address_of(assemble, problem), solve=address_of(solve, ws),
         )  # fmt: skip

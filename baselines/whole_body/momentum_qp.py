@@ -238,12 +238,10 @@ class AroundQP(BaseController):
 
     @property
     def vdot(self) -> np.ndarray:
-        """(nv,) accelerations of the QP's last solution."""
         return self.qp.vdot
 
     @property
     def root_wrench(self) -> np.ndarray:
-        """(6,) u_root of the QP's last tick, soft root only."""
         return self.qp.root_wrench
 
     def reset(self, state: RobotState | None = None) -> None:

@@ -110,9 +110,7 @@ def momentum_tick(t: Tick):
 class ContactTick(Block):
     """All that a tick of one subset works on."""
 
-    source: StateArrays  # with all soles
-    pick: np.ndarray  # (nc,) int: the soles of the subset
-    problem: Assembly  # with these soles only
+    problem: Assembly  # of a state whose arrays of soles are views: these soles only
     memory: Memory
     load_limits: Annotated[np.ndarray, "nc"]  # [N]
     limited: Integer  # 1 where these limits count
@@ -126,23 +124,15 @@ class ContactTick(Block):
 
 
 @compiled
-def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
-    """Copy what belongs to soles; the origin is the mean of those picked."""
-    nc = pick.shape[0]
-    own.origin[:] = 0.0
+def update_origin(s: StateArrays):
+    """Set the origin of a state with some of the soles to the mean of these."""
+    nc = s.sole_point.shape[0]
+    s.origin[:] = 0.0
     for i in range(nc):
-        sole = pick[i]
-        for r in range(6):
-            copy_into(source.J[6 * sole + r], own.J[6 * i + r])
-            own.J_v[6 * i + r] = source.J_v[6 * sole + r]
-            own.Jdot_v[6 * i + r] = source.Jdot_v[6 * sole + r]
         for a in range(3):
-            copy_into(source.sole_axes[sole, a], own.sole_axes[i, a])
-            own.sole_point[i, a] = source.sole_point[sole, a]
-            own.origin[a] += source.sole_point[sole, a]
-        own.contacts[i] = source.contacts[sole]
+            s.origin[a] += s.sole_point[i, a]
     for a in range(3):
-        own.origin[a] /= nc
+        s.origin[a] /= nc
 
 
 @compiled
@@ -160,7 +150,7 @@ def assemble_contacts(t: ContactTick):
     """The reduced QP of a subset."""
     ws, cone = t.problem.workspace, t.problem.parameters.cone
     choose_set(t)
-    pick_soles(t.source, t.pick, t.problem.state)
+    update_origin(t.problem.state)
     call(t.assemble, t.problem)
     if t.limited[0]:
         for i in range(cone.shape[0]):
@@ -191,7 +181,7 @@ def solve_contacts(t: ContactTick):
     if ws.status[0] != 0 and t.follows[0]:
         bound_torques(t, False)
         call(t.solve, ws)
-    accept(t.source, t.problem.parameters, ws, t.memory)
+    accept(t.problem.state, t.problem.parameters, ws, t.memory)
     for a in range(ws.tau.shape[0]):
         if t.follows[0]:
             ws.tau[a] = min(max(ws.tau[a], t.applied[a] - t.slew[a]), t.applied[a] + t.slew[a])

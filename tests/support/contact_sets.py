@@ -1,7 +1,7 @@
 """The QPs of `ContactSets`, one at a time: as problems, and solved."""
 
 from poise.baselines.solvers import QP
-from poise.baselines.whole_body.tick import assemble_contacts, contact_tick, pick_soles
+from poise.baselines.whole_body.tick import assemble_contacts, contact_tick, update_origin
 from poise.envs.physics.state import RobotState
 
 
@@ -24,7 +24,7 @@ def tick(sets, state, targets, soles, tasks=(), load_limits=None):
 def restricted(sets, state, targets, soles):
     """The state with these soles only."""
     own = sets.bind(soles, state.arrays, targets.arrays()).problem.state
-    pick_soles(state.arrays, sets.sets[soles].pick, own)
+    update_origin(own)
     return RobotState(sets.sets[soles].arrays, own)
 
 

@@ -39,19 +39,22 @@ def check_qps(
 ) -> None:
     """Raises ConfigError for what the QPs of a controller that steps, and `further` ones by the
     name of their field, cannot be."""
-    stepping = {"step_qp": config.step_qp, **(further or {})}
-    for name, qp in {"qp": config.qp, **stepping}.items():
+    for name, qp in {"qp": config.qp, "step_qp": config.step_qp, **(further or {})}.items():
         if qp.root != "hard":
             raise ConfigError(f"must be 'hard', not {qp.root!r}", field=f"{name}.root")
-    for name, qp in stepping.items():
         if qp.solver != COMPILED_SOLVER:
             raise ConfigError(
                 f"must be {COMPILED_SOLVER!r}, not {qp.solver!r}", field=f"{name}.solver"
             )
+        if qp.solver_options:
+            raise ConfigError("must be empty", field=f"{name}.solver_options")
         if qp.period != config.qp.period:
             raise ConfigError(
                 f"must be that of qp, {config.qp.period}, not {qp.period}", field=f"{name}.period"
             )
+        for task, gains in qp.tasks.items():
+            if gains.kernel is None:
+                raise ConfigError("has no kernel", field=f"{name}.tasks.{task}")
 
 
 def allocate_step_memory(region: CopRegion) -> StepMemory:
@@ -112,18 +115,12 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     @property
     def vdot(self) -> np.ndarray:
         """(nv,) accelerations that the last torques are to bring."""
-        asked = self._tick is not None and self._tick.to_python[0]
-        return self.qp.vdot if asked else self._vdot.copy()
+        return self._vdot.copy()
 
     @property
     def step_limits(self) -> StepLimits | None:
         """See `SteppingController`; None where the legs are too slow for any step."""
         return self._step_limits
-
-    @property
-    def compiled(self) -> bool:
-        """See `CompiledController`; other solvers are called from Python."""
-        return super().compiled and self.qp.compiled
 
     def gains(self) -> QPParameters:
         """See `CompiledController`."""
@@ -180,9 +177,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             or known.standing.problem.parameters is not self.qp.parameters
         ):  # fmt: skip
             blocks = self.blocks(state, targets)
-            standing = NO_KERNEL
-            if self.qp.compiled:
-                standing = address_of(momentum_tick, blocks.standing)
+            standing = address_of(momentum_tick, blocks.standing)
             contacts = address_of(contact_tick, blocks.on_both)
             known = self._tick = replace(blocks, standing_kernel=standing, contact_kernel=contacts)
         return known
@@ -243,6 +238,4 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
         self.kernel(self.block(state, targets))
-        if self._tick is not None and self._tick.to_python[0]:
-            return self.qp.torques(state, targets)
         return self.tau[self._motors]

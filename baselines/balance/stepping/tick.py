@@ -6,7 +6,7 @@
 import numpy as np
 
 from poise.baselines.balance.references.targets import TRIGGER
-from poise.baselines.whole_body.tick import ContactTick
+from poise.baselines.whole_body.tick import ContactTick, go_on_from
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
@@ -87,11 +87,8 @@ def begin_step(t: CaptureTick, to_nominal: bool) -> None:
     s, m, q = t.state, t.memory, t.search
     wrenches = t.on_both.problem.workspace.wrenches
     if m.steps[0] == 0:
-        before = t.standing.problem.workspace
-        copy_into(before.tau, t.on_both.applied)
-        copy_into(before.tau, t.on_both.memory.torques)
-        t.on_both.follows[0] = 1
-        wrenches = before.wrenches
+        go_on_from(t.on_both, t.standing.problem.workspace.tau)
+        wrenches = t.standing.problem.workspace.wrenches
     if m.recovering[0] == 0:
         set_level_frame(m.level_frame, s.heading[0], s.heading[1])
     q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
@@ -192,10 +189,7 @@ def double_support_tick(t: CaptureTick) -> None:
 
 @compiled
 def standing_tick(t: CaptureTick) -> None:
-    """A tick before the first step: the QP with the feet in place, or a request to Python."""
-    if t.standing_kernel == 0:
-        t.to_python[0] = 1
-        return
+    """A tick before the first step: the QP with the feet in place."""
     call(t.standing_kernel, t.standing)
     copy_into(t.standing.problem.workspace.tau, t.tau)
     copy_into(t.standing.problem.workspace.vdot, t.vdot)
@@ -204,9 +198,8 @@ def standing_tick(t: CaptureTick) -> None:
 
 @compiled
 def capture_tick(t: CaptureTick) -> None:
-    """One tick of `CaptureStep`: `tau` holds torques, unless `to_python` says that Python must."""
+    """One tick of `CaptureStep`: `tau` then holds torques."""
     m = t.memory
-    t.to_python[0] = 0
     if not m.moved[0] and moves(t):
         m.moved[0] = 1
     if not m.swinging[0]:

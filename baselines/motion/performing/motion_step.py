@@ -114,8 +114,5 @@ class MotionStep(CaptureStep):
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         if self.performance is None:
             return super().torques(state, targets)
-        tick = self.perform_tick(state, targets)
-        perform_tick(tick)
-        if tick.capture.to_python[0]:
-            return self.qp.torques(state, self.resting(state))
+        perform_tick(self.perform_tick(state, targets))
         return self.tau[self._motors]

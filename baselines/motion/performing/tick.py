@@ -229,10 +229,9 @@ def perform(t: PerformTick, time: float) -> bool:
 
 @compiled
 def perform_tick(t: PerformTick) -> None:
-    """One tick of `MotionStep` in a motion with steps: `tau` of the capture's block holds torques,
-    unless `to_python` says that Python must."""
+    """One tick of `MotionStep` in a motion with steps: `tau` of the capture's block then holds
+    torques."""
     c, p = t.capture, t.performance
-    c.to_python[0] = 0
     time = motion_time(t)
     p.clock[0] += t.own.gains.period
     sample_footing(t, time)

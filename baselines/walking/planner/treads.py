@@ -7,7 +7,7 @@ touchdown is chosen so that the foothold that the capture point asks for is on i
 
 import numpy as np
 
-from poise.baselines.balance.stepping.planning.swing import lead, time_left
+from poise.baselines.balance.stepping.planning.swing import quintic, time_left
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import turned
 from poise.envs.terrain.arrays import X_MAX, X_MIN, surface_below, surface_height
@@ -187,7 +187,10 @@ def _lead(t: WalkTick, a: int, place: float, speed: float, until: float) -> None
     """Move axis `a` of the swing a tick further on its way to a place and a speed, there `until`
     [s] after lift-off."""
     w, dt = t.walk.swing, t.walk.gains.period
-    lead(w.reference, a, place, speed, max(until - w.time[0], dt), dt)
+    now = w.reference
+    now[0, a], now[1, a], now[2, a] = quintic(
+        now[0, a], now[1, a], now[2, a], place, speed, 0.0, max(until - w.time[0], dt), dt
+    )
 
 
 @compiled

@@ -81,7 +81,7 @@ def test_motion_obeys_physics_and_leaves_the_stance(sets, soles):
     state, targets, task = situation()
     _, ws = contact_sets.tick(sets, state, targets, soles, [task] if 0 not in soles else [])
     chosen = sets.sets[soles]
-    own = (6 * chosen.pick[:, None] + np.arange(6)).ravel()
+    own = (6 * np.array(soles)[:, None] + np.arange(6)).ravel()
     J = state.J[own]
     force = state.M @ ws.vdot + state.h - J.T @ ws.wrenches
     np.testing.assert_allclose(force[:6], 0.0, atol=1e-6)

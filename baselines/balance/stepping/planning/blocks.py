@@ -151,10 +151,9 @@ class CaptureTick(Block):
     tau: np.ndarray  # (nv−6,) torques of the tick [N·m]
     vdot: np.ndarray  # (nv,) accelerations that they are to bring
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
-    to_python: Integer  # 1 where Python has to solve `standing`
     corners: Annotated[np.ndarray, "k", 2]  # scratch
     cloud: Annotated[np.ndarray, "n", 2]  # scratch
     pair: Annotated[np.ndarray, 2]  # scratch
     vector: Annotated[np.ndarray, 3]  # scratch
-    standing_kernel: Kernel[Tick]  # `momentum_tick`; 0: Python calls another solver
+    standing_kernel: Kernel[Tick]  # `momentum_tick`
     contact_kernel: Kernel[ContactTick]  # `contact_tick`

@@ -88,7 +88,7 @@ def aim_swing(w: Swing, x: float, y: float, duration: float) -> None:
 
 
 @compiled
-def lead(
+def _lead(
     reference: np.ndarray, a: int, position: float, velocity: float, duration: float, dt: float
 ) -> None:
     """Move axis `a` of the reference `dt` further on its way to a place and a speed."""
@@ -104,14 +104,14 @@ def advance_over(w: Swing, apex: float, dt: float) -> None:
     rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
     for a in range(2):
         if rest > dt:
-            lead(now, a, w.foothold[a], 0.0, rest, dt)
+            _lead(now, a, w.foothold[a], 0.0, rest, dt)
         else:
             now[0, a], now[1, a], now[2, a] = w.foothold[a], 0.0, 0.0
     lift = w.lift * w.duration[0]
     if w.time[0] + dt < lift:
-        lead(now, 2, ground + apex, 0.0, lift - w.time[0], dt)
+        _lead(now, 2, ground + apex, 0.0, lift - w.time[0], dt)
     elif rest > dt:
-        lead(now, 2, ground, -speed, rest, dt)
+        _lead(now, 2, ground, -speed, rest, dt)
     else:
         now[0, 2], now[1, 2], now[2, 2] = now[0, 2] - speed * dt, -speed, 0.0
     w.time[0] += dt

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from poise.baselines.balance.in_place.guided import (
-    LQRLIP,
-    CapturePoint,
-    CapturePointConfig,
-    lqr_gain,
-)
+from poise.baselines.balance.in_place.capture_point import CapturePoint, CapturePointConfig
 from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
+from poise.baselines.balance.in_place.lqr_lip import LQRLIP, lqr_gain
 from poise.baselines.controller import Targets
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.envs.compiled.maths.pendulum import lip_step

@@ -276,6 +276,8 @@ def test_a_step_at_the_first_tick_does_not_know_the_trial_before():
         ("qp", {"root": "soft"}, r"qp\.root: must be 'hard'"),
         ("step_qp", {"root": "soft"}, r"step_qp\.root: must be 'hard'"),
         ("step_qp", {"solver": "daqp"}, r"step_qp\.solver: must be 'active-set'"),
+        ("qp", {"solver": "daqp"}, r"qp\.solver: must be 'active-set'"),
+        ("qp", {"solver_options": {"max_iter": 9.0}}, r"qp\.solver_options: must be empty"),
         ("step_qp", {"period": 0.002}, r"step_qp\.period: must be that of qp"),
     ],
 )
@@ -285,15 +287,6 @@ def test_qps_that_cannot_step_are_refused(qp, changes, named):
     config = replace(config, **{qp: replace(getattr(config, qp), **changes)})
     with pytest.raises(ConfigError, match=named):
         CaptureStep(robot(), config)
-
-
-def test_another_solver_holds_the_feet_in_place():
-    """Python calls it until the first step; then the compiled problem takes over."""
-    settings = to_dict(controller_config("capture-step"))
-    settings["qp"]["solver"] = "daqp"
-    fallen, env = trial(settings, 24.0, 0.0, seed=1, duration=2.0)
-    assert env.compiled_step() is None
-    assert not fallen and env.controller.steps >= 1 and env.controller.failures == 0
 
 
 def test_replicas_start_anew():
