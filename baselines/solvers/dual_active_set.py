@@ -86,11 +86,7 @@ def _correct(
 
 @compiled
 def _step_length(
-    r: np.ndarray,
-    mult: np.ndarray,
-    equalities: int,
-    q: int,
-    dependent: bool,
+    r: np.ndarray, mult: np.ndarray, equalities: int, q: int, dependent: bool
 ) -> tuple[int, float]:
     """Largest step that keeps the multipliers of inequalities ≥ 0, and the one that blocks it."""
     largest = 0.0

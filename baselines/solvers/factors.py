@@ -78,11 +78,7 @@ def _finish_row(Jt: np.ndarray, k: int, scale: float):
 
 @compiled
 def split(
-    Jt: np.ndarray,
-    q: int,
-    normal: np.ndarray,
-    d: np.ndarray,
-    z: np.ndarray,
+    Jt: np.ndarray, q: int, normal: np.ndarray, d: np.ndarray, z: np.ndarray
 ) -> tuple[float, float]:
     """d = Jᵀn and z = J₂d₂; returns ‖d₂‖² (= nᵀz) and ‖d‖²."""
     n, p = Jt.shape

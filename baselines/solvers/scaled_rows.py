@@ -70,10 +70,7 @@ def advance(Ct: np.ndarray, z: np.ndarray, t: float, s: np.ndarray, product: np.
 
 @compiled
 def most_violated(
-    s: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    violation: np.ndarray,
+    s: np.ndarray, lower: np.ndarray, upper: np.ndarray, violation: np.ndarray
 ) -> tuple[int, float]:
     """Index and violation of the most violated row; −1 and 0 if there is none."""
     for i in range(s.shape[0]):

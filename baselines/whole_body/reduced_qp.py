@@ -27,12 +27,7 @@ from poise.envs.physics.kinematics import StateArrays
 
 from .constraints import build_constraints
 from .contacts.contact import ContactArrays
-from .objective import (
-    build_objective,
-    carry_momentum,
-    desired_accelerations,
-    desired_momentum_rate,
-)
+from .objective import build_objective, carry_momentum, desired_accelerations, desired_momentum_rate
 from .parameters import QPParameters
 from .stack import TaskStack, add_stack
 from .workspace import Workspace

@@ -8,11 +8,7 @@ import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.balance.stepping.planning.config import StepLimits, SwingTask
-from poise.baselines.balance.stepping.planning.swing_speed import (
-    highest,
-    highest_lift,
-    swing_time,
-)
+from poise.baselines.balance.stepping.planning.swing_speed import highest, highest_lift, swing_time
 from poise.configs.errors import ConfigError
 from poise.envs.physics.legs import turn_range
 from poise.envs.robots.robot import Robot
