@@ -141,9 +141,10 @@ def read_robot_clip(path: str | Path) -> RobotClip:
                 f"must be {len(clip.qpos)} rows of two numbers, 1 where a sole is planted, else 0",
                 source=path, field=PLANTED,
             )  # fmt: skip
-        clip = replace(clip, planted=np.asarray(planted > 0.0))
+        planted = np.asarray(planted > 0.0)
         if not clip.free:
-            check_planted(clip.planted, str(path))
+            check_planted(planted, str(path))
+        clip = replace(clip, planted=planted)
     return clip
 
 
