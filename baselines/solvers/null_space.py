@@ -37,7 +37,7 @@ class NullSpace(Block):
     open: Annotated[np.ndarray, "k", np.bool_]  # rows of J still to be eliminated
     spare: int  # 1 where the weakest row, the last of `pivot`, is no equality; else 0
     weakest: Annotated[np.ndarray, 2]  # R, r: that row of J v̇ = b is R x_0 = r, x_0 the first of x
-    basis: Annotated[np.ndarray, "nh", "np"]  # null vectors, then v̇₀, as columns
+    basis: Annotated[np.ndarray, "nh", "nb"]  # null vectors, then v̇₀, as columns
 
 
 def allocate_null_space(
@@ -47,8 +47,8 @@ def allocate_null_space(
     k = 6 * len(chains) + 3 * len(points)
     held = np.unique(np.concatenate([*chains, *points]))
     nh, steps, spare = len(held), min(k, len(held)), int(short_legs(chains))
-    kp, np_ = (-(-columns // 8) * 8 for columns in (k, nh - steps + spare + 1))
-    sizes = {"nh": nh, "k": k, "kp": kp, "np": np_, "width": max(kp, np_), "steps": steps}
+    kp, nb = (-(-columns // 8) * 8 for columns in (k, nh - steps + spare + 1))
+    sizes = {"nh": nh, "k": k, "kp": kp, "nb": nb, "width": max(kp, nb), "steps": steps}
     return NullSpace.allocate(sizes, held=held, free=np.setdiff1d(np.arange(nv), held), spare=spare)
 
 

@@ -71,8 +71,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     c̈ = ω² (c − p), p = ξ + k (ξ − ξ_ref) at most at the edge of the soles in contact [Koolen12,
     Englsberger11], and the foothold follows ξ. Steps stay within what the legs' motors can do; a
     robot whose feet could not be down again in time never steps. The ticks are those of `tick.py`;
-    they are bound to `config` when they are made. Raises ConfigError unless there are
-    two soles, and both QPs have a hard root and one period.
+    they are bound to `config` when they are made. Raises ConfigError unless there are two soles,
+    and all QPs have a hard root, one period, the compiled solver and kernels for all tasks.
     """
 
     kernel: Callable[[Any], None] = staticmethod(capture_tick)  #: that a tick of steps runs

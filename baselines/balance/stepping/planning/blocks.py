@@ -124,7 +124,7 @@ class StepMemory(Block):
     clock: Number  # since the last touchdown [s]
     load: Number  # that the foot bore when its step began [N]
     load_fraction: Number  # of this load that it still bears
-    region: Annotated[np.ndarray, "2n+1", 2]  # CoP region of both soles, of the last touchdown [m]
+    region: Annotated[np.ndarray, "2n+1", 2]  # CoP region of both soles since touchdown [m]
     corners: Integer  # how many rows of it count; 0: it is not known
     moved: Integer  # 1 once the motion has moved
     return_fraction: Number  # of the way from the stance's posture to the motion's
