@@ -52,14 +52,17 @@ def ranked(entries: Mapping[str, Entry]) -> list[str]:
     return sorted(entries, key=lambda name: (assisted(entries[name]), -_value(entries[name], key)))
 
 
-def places(entries: Mapping[str, Entry]) -> dict[str, int | None]:
+def places(
+    entries: Mapping[str, Entry], measure: tuple[str, str] | None = None
+) -> dict[str, int | None]:
     """The rank of each controller; those whose results print alike share one.
 
-    None for those that took a force from nowhere.
+    None for those that took a force from nowhere, or have no value of the `measure`: a key and the
+    form in which it is printed, by default what they are `ranked` by.
     """
-    key, form = _measure(entries)
-    shown = {name: float(format(_value(entry, key), form))
-             for name, entry in entries.items() if not assisted(entry)}  # fmt: skip
+    key, form = measure or _measure(entries)
+    shown = {name: float(format(_value(entry, key), form)) for name, entry in entries.items()
+             if key in entry and not assisted(entry)}  # fmt: skip
     better = {name: sum(other > value for other in shown.values()) for name, value in shown.items()}
     return {name: better[name] + 1 if name in better else None for name in entries}
 
