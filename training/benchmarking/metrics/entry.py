@@ -1,5 +1,7 @@
 """A controller's entry of summary.json is computed here."""
 
+from typing import cast
+
 import numpy as np
 
 from poise.training.benchmarking.diagnosis.words import losses
@@ -11,7 +13,6 @@ from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.suites.scenarios import PART as SCENARIOS
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit
-from poise.training.benchmarking.trials.trial import Outcome
 from poise.training.running.summary import (
     Direction,
     Entry,
@@ -29,7 +30,9 @@ from .played import (
     DIRECTIONAL,
     Played,
     ankle_limits,
+    cells,
     counts,
+    fitted,
     fractions,
     once,
     part,
@@ -84,14 +87,10 @@ def envelope(
     etas = mean_over_directions(direction, over_limit, recovered)
     ankle = [limits.ankle(angle, float(duration[0])) for angle in fit.directions]
     eta_values = eta([f.fit.j50 for f in fit.fits], mass, np.array(ankle) / mass)
-    directions: list[Direction] = [
+    directions = [
         {
             "direction": angle,
-            "trials": f.fit.trials,
-            "recovered": f.fit.recovered,
-            "j50": f.fit.j50,
-            "j50_ci95": f.j50_ci,
-            "j50_bound": f.fit.bound,
+            **fitted(f, "j50"),
             "j50_per_mass": f.fit.j50 / mass,
             "j90": f.fit.j90,
             "j90_ci95": f.j90_ci,
@@ -115,7 +114,7 @@ def envelope(
         "eta_mean": float(np.mean(eta_values)),
         "eta_mean_ci95": etas.j50_mean_ci,
         "eta_min": float(np.min(eta_values)),
-        "directions": directions,
+        "directions": cast(list[Direction], directions),
     }
     if steps is not None:
         steps.add_to(figures, float(duration[0]))
@@ -124,32 +123,22 @@ def envelope(
 
 def _fractions(played: Played, limits: PushLimits) -> Fractions:
     fit, by_sector = fit_logistic(fractions(played), won(played)), sectors(played)
-    found: list[Sector] = [
-        {
-            "direction": angle,
-            "trials": f.fit.trials,
-            "recovered": f.fit.recovered,
-            "fraction50": f.fit.j50,
-            "fraction50_ci95": f.j50_ci,
-            "fraction50_bound": f.fit.bound,
-        }
+    found = [
+        {"direction": angle, **fitted(f, "fraction50")}
         for angle, f in zip(by_sector.directions, by_sector.fits, strict=True)
     ]
     return {
         "fraction_of": limits.scale,
         "fraction50": fit.j50,
         "fraction50_bound": fit.bound,
-        "sectors": found,
+        "sectors": cast(list[Sector], found),
     }
 
 
 def _scenarios(played: Played) -> list[ScenarioFigures]:
     """Of each scenario that a controller has played, in the order of the suite."""
-    cells: dict[str, list[Outcome]] = {}
-    for trial, outcome in played:
-        cells.setdefault(str(trial.level), []).append(outcome)
     found: list[ScenarioFigures] = []
-    for name, outcomes in cells.items():
+    for name, outcomes in cells(played, lambda trial: str(trial.level)).items():
         figures: ScenarioFigures = {"scenario": name, **counts(outcomes)}
         if speeds := [o.speed_ahead for o in outcomes if o.speed_ahead is not None]:
             figures["speed_ahead"] = sum(speeds) / len(speeds)

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
+from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.suites.plan import at_level
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.running.summary import RealismLevel
 
-from .played import DIRECTIONAL, Played, counts, part, pushes, ratio, won
+from .played import DIRECTIONAL, Played, counts, part, pushes, won
 
 RATED = ("random", "mix")  # parts that rates are of, where a suite has one
 

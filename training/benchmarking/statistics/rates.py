@@ -5,7 +5,6 @@ random numbers draws them from a seed, so that the same trials give the same fig
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, TypedDict
 
 import numpy as np
@@ -18,26 +17,6 @@ class Interval(NamedTuple):
 
     low: float
     high: float
-
-
-@dataclass(frozen=True)
-class McNemar:
-    """Outcome of McNemar's test on paired trials."""
-
-    only_a: int
-    only_b: int
-    p_value: float
-    method: str
-
-
-@dataclass(frozen=True)
-class SeedAggregate:
-    """Interquartile mean over training seeds and tasks, with its bootstrap interval."""
-
-    iqm: float
-    interval: Interval
-    seeds: int
-    tasks: int
 
 
 class SeedFigures(TypedDict):
@@ -96,8 +75,8 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> In
     return Interval(low, high)
 
 
-def mcnemar(only_a: int, only_b: int) -> McNemar:
-    """McNemar's test: do two controllers recover equally often on the same trials?
+def mcnemar(only_a: int, only_b: int) -> float:
+    """The p-value of McNemar's test: do two controllers recover equally often on the same trials?
 
     Only the trials count on which they differ: `only_a` recovered by a alone, `only_b` by b alone.
     If both are equally good, only_a is Binomial(only_a + only_b, ½). The p-value is the exact
@@ -110,7 +89,7 @@ def mcnemar(only_a: int, only_b: int) -> McNemar:
     if only_a < 0 or only_b < 0:
         raise ValueError(f"counts must not be negative, got {only_a} and {only_b}")
     tail = float(scipy.stats.binom.cdf(min(only_a, only_b), only_a + only_b, 0.5))
-    return McNemar(int(only_a), int(only_b), min(1.0, 2 * tail), "exact binomial, two-sided")
+    return min(1.0, 2 * tail)
 
 
 def iqm(scores: ArrayLike) -> float:
@@ -126,7 +105,7 @@ def iqm(scores: ArrayLike) -> float:
 
 def seed_aggregate(
     scores: ArrayLike, *, resamples: int = 2000, confidence: float = 0.95, seed: int = 0
-) -> SeedAggregate:
+) -> tuple[float, Interval]:
     """IQM of scores over training seeds, with a stratified percentile bootstrap [Agarwal21].
 
     Args:
@@ -147,17 +126,18 @@ def seed_aggregate(
     rows = np.random.default_rng(seed).integers(seeds, size=(resamples, seeds, tasks))
     drawn = np.take_along_axis(table[None], rows, axis=1)
     replicates = scipy.stats.trim_mean(drawn.reshape(resamples, -1), 0.25, axis=1)
-    return SeedAggregate(iqm(table), percentile_interval(replicates, confidence), seeds, tasks)
+    return iqm(table), percentile_interval(replicates, confidence)
 
 
 def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
     """IQM of (seeds, tasks) with its interval, every seed's mean, and the worst of these."""
-    found, values = seed_aggregate(scores), scores.mean(axis=1)
+    mean, interval = seed_aggregate(scores)
+    values = scores.mean(axis=1)
     worst = int(np.argmin(values))
     return {
-        "iqm": found.iqm,
-        "iqm_ci95": found.interval,
-        "tasks": found.tasks,
+        "iqm": mean,
+        "iqm_ci95": interval,
+        "tasks": scores.shape[1],
         "values": values.tolist(),
         "worst": float(values[worst]),
         "worst_seed": seeds[worst],

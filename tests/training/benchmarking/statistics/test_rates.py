@@ -76,22 +76,19 @@ def test_confidence_must_be_a_probability(confidence):
 def test_mcnemar_matches_the_binomial_test(counts):
     """The p-value is scipy's exact two-sided binomial test, for few and for many differences."""
     expected = stats.binomtest(counts[0], sum(counts), 0.5).pvalue if sum(counts) else 1.0
-    result = mcnemar(*counts)
-    assert result.p_value == pytest.approx(expected, rel=1e-9)
-    assert (result.only_a, result.only_b) == counts
-    assert "exact" in result.method
+    assert mcnemar(*counts) == pytest.approx(expected, rel=1e-9)
 
 
 def test_mcnemar_matches_statsmodels():
     """The p-value is statsmodels' exact McNemar test, whatever the trials that agree."""
     tables = pytest.importorskip("statsmodels.stats.contingency_tables")
     expected = tables.mcnemar([[100, 6], [17, 50]], exact=True).pvalue
-    assert mcnemar(6, 17).p_value == pytest.approx(expected, rel=1e-9)
+    assert mcnemar(6, 17) == pytest.approx(expected, rel=1e-9)
 
 
 def test_mcnemar_of_a_clear_winner_is_tiny_and_positive():
     """A thousand wins to one give a p-value near zero, not a rounding accident."""
-    assert 0 < mcnemar(1, 1000).p_value < 1e-200
+    assert 0 < mcnemar(1, 1000) < 1e-200
 
 
 def test_mcnemar_refuses_negative_counts():
@@ -120,7 +117,7 @@ def test_seed_aggregate_covers_the_true_mean():
     held = 0
     for k in range(200):
         scores = 5 + np.linspace(-1, 1, 4) + rng.normal(0, 1, size=(10, 4))
-        ci = seed_aggregate(scores, resamples=300, seed=k).interval
+        _, ci = seed_aggregate(scores, resamples=300, seed=k)
         held += ci.low <= 5 <= ci.high
     assert 0.88 <= held / 200 <= 0.99
 
@@ -128,17 +125,15 @@ def test_seed_aggregate_covers_the_true_mean():
 def test_seed_aggregate_resamples_within_each_task():
     """Tasks of different difficulty add no width: the bootstrap is stratified by task."""
     scores = np.tile([0.0, 10.0, 20.0, 30.0], (5, 1))
-    result = seed_aggregate(scores)
-    assert result.interval == (15.0, 15.0)
-    assert (result.iqm, result.seeds, result.tasks) == (15.0, 5, 4)
+    assert seed_aggregate(scores) == (15.0, (15.0, 15.0))
 
 
 def test_seed_aggregate_resamples_tasks_apart():
     """Each task draws its own seeds: errors of the seeds average out over tasks."""
     seeds = np.array([[-1.0], [0.0], [1.0]])
-    one = seed_aggregate(seeds)
-    many = seed_aggregate(np.tile(seeds, (1, 50)))
-    assert np.ptp(many.interval) < 0.5 * np.ptp(one.interval)
+    _, one = seed_aggregate(seeds)
+    _, many = seed_aggregate(np.tile(seeds, (1, 50)))
+    assert np.ptp(many) < 0.5 * np.ptp(one)
 
 
 def test_seed_aggregate_repeats_from_its_seed():
