@@ -8,6 +8,7 @@ import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import has_diverged, uprightness
+from poise.envs.robots.models.tree import lineage
 from poise.envs.robots.robot import Robot
 
 from .record import Course
@@ -130,12 +131,8 @@ def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
 def bearing(robot: Robot) -> np.ndarray:
     """(nu,) whether a motor is between the root and a sole."""
     model = robot.model
-    between = set()
-    for sole in robot.soles:
-        body = sole.body_id
-        while body not in (0, robot.root_body_id):
-            between.add(body)
-            body = int(model.body_parentid[body])
+    limbs = {body for sole in robot.soles for body in lineage(model, sole.body_id)}
+    between = limbs - {*lineage(model, robot.root_body_id)}
     bodies = model.dof_bodyid[np.array(robot.motor_dofs)]
     return np.isin(bodies, list(between))
 

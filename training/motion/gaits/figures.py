@@ -12,7 +12,7 @@ from poise.training.pictures.figures.style import legend_below, look, saved_figu
 from poise.training.running.columns import COSTS, FOLLOWED, J50_MEAN, TICK, Figure, known
 from poise.training.running.tables import figure_table
 
-from .stance import POINTS, KneeMoment
+from .knee_moment import POINTS, KneeMoment
 
 
 @dataclass(frozen=True)

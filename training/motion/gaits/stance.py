@@ -1,19 +1,17 @@
-"""Stances: the knee's torque, the ground's force, the CoM's height; the human knee beside them."""
+"""Stances of a walk: the knee's torque, the ground's force, the CoM's height."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from poise.baselines.walking.models.legs import leg_arrays
-from poise.configs.files import resolve
-from poise.configs.schema import build, read_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.trials.gait_record import knee_motors
 
-POINTS = 51  # of a curve over stance
+from .knee_moment import POINTS
+
 SHORTEST = 0.1  # [s] that a foot is down: a stance
 
 
@@ -90,39 +88,3 @@ def _spans(down: np.ndarray, time: np.ndarray, since: float) -> list[tuple[int, 
 def _resampled(values: np.ndarray) -> np.ndarray:
     """(51,) values over a stance whose time is normalised."""
     return np.interp(np.linspace(0.0, 1.0, POINTS), np.linspace(0.0, 1.0, len(values)), values)
-
-
-@dataclass(frozen=True)
-class KneeMoment:
-    """The knee's moment in the sagittal plane, extension positive, at points of stance.
-
-    Attributes:
-        source: where the figures are from.
-        stance: rising from 0 to 100 [%].
-        mean: [N·m/kg].
-        half_width: of the band [N·m/kg].
-    """
-
-    source: str
-    stance: tuple[float, ...]
-    mean: tuple[float, ...]
-    half_width: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        if not len(self.stance) == len(self.mean) == len(self.half_width) >= 2:
-            raise ValueError("stance: must be as long as mean and half_width, two points or more")
-        if self.stance[0] != 0.0 or self.stance[-1] != 100.0 or np.any(np.diff(self.stance) <= 0):
-            raise ValueError("stance: must rise from 0 to 100")
-        if min(self.half_width) < 0.0:
-            raise ValueError("half_width: must not be negative")
-
-    def curves(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and half width (51,) [N·m/kg] at every 2 % of stance, linear between the points."""
-        at = np.linspace(0.0, 100.0, POINTS)
-        return np.interp(at, self.stance, self.mean), np.interp(at, self.stance, self.half_width)
-
-
-def load_knee_moment(name: str | Path = "knee-moment") -> KneeMoment:
-    """A packaged band, or that of a YAML file; raises ConfigError for one that is not valid."""
-    path = resolve("human", name)
-    return build(KneeMoment, read_yaml(path), path)
