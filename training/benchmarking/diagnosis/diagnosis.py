@@ -21,41 +21,28 @@ MISSED = 0.05  # [m] from where a foot lands to where it was to land
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Why a trial was lost; times in s after the reset, None where there is no such thing.
+    """Why a trial was lost; times in s after the reset, None where there is no such thing."""
 
-    Attributes:
-        loss: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far),
-            "contact" (more than the feet on the ground), "diverged" (numbers too large), "not
-            quiet" (on its feet, but not upright and at rest at the end), "off command" (a walk that
-            did not go on as commanded), "motion" (a fall from a motion), "error".
-        loss_body: body that touched the ground, where that is the criterion.
-        full_motor: motor between root and soles that was first at its limit after the first push,
-            for 2 policy steps or more in a row. Arms are swung as hard as they can be, which is no
-            reason to fall.
-        full_from: when that began.
-        full_time: how long it lasted then.
-        capture_left: when the capture point left the support for the last time.
-        capture_outside: how far outside it came at most from then on [m].
-        foothold: "slipped" (a sole moved by 3 cm while it stood) or "missed" (a foot landed 5 cm or
-            more from where it was to land), whichever came first.
-        foothold_time: when.
-        foothold_error: how far [m].
-        failures_from: when the controller's solver first failed.
-        hardware: what sensors or motors did where a suite's conditions say that they are not
-            perfect; in words.
-    """
-
+    #: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far), "contact"
+    #: (more than the feet on the ground), "diverged" (numbers too large), "not quiet" (on its feet,
+    #: but not upright and at rest at the end), "off command" (a walk that did not go on as
+    #: commanded), "motion" (a fall from a motion), "error"
     loss: str | None = None
-    loss_body: str | None = None
+    loss_body: str | None = None  #: that touched the ground, where that is the criterion
+    #: motor between root and soles that was first at its limit after the first push, for 2 policy
+    #: steps or more in a row. Arms are swung as hard as they can be, which is no reason to fall
     full_motor: str | None = None
-    full_from: float | None = None
-    full_time: float | None = None
-    capture_left: float | None = None
-    capture_outside: float | None = None
+    full_from: float | None = None  #: when that began
+    full_time: float | None = None  #: how long it lasted then
+    capture_left: float | None = None  #: when the capture point left the support for the last time
+    capture_outside: float | None = None  #: how far outside it came at most from then on [m]
+    #: "slipped" (a sole moved by 3 cm while it stood) or "missed" (a foot landed 5 cm or more from
+    #: where it was to land), whichever came first
     foothold: str | None = None
-    foothold_time: float | None = None
-    foothold_error: float | None = None
-    failures_from: float | None = None
+    foothold_time: float | None = None  #: when
+    foothold_error: float | None = None  #: how far [m]
+    failures_from: float | None = None  #: when the controller's solver first failed
+    #: what sensors or motors did where a suite's conditions say that they are not perfect; in words
     hardware: str | None = None
 
 

@@ -12,29 +12,17 @@ from poise.envs.balance.episode import FAILURES
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """The course of a trial: n rows, one after the reset and one after every policy step.
+    """The course of a trial: n rows, one after the reset and one after every policy step."""
 
-    Attributes:
-        time: (n,) [s].
-        load: (n, nu) |τ| of the motors over their limits.
-        capture_point: (n, 2) [m].
-        supports: n polygons (k, 2) of the support [m].
-        contacts: (n, nc) whether each sole touches the ground.
-        soles: (n, nc, 2) their places [m].
-        foothold: (n, 2) where the foot that swings is to land [m]; NaN where none swings.
-        swinging: (n,) that foot; −1: none.
-        failures: (n,) control ticks so far at which the controller's solver failed.
-    """
-
-    time: np.ndarray
-    load: np.ndarray
-    capture_point: np.ndarray
-    supports: list[np.ndarray]
-    contacts: np.ndarray
-    soles: np.ndarray
-    foothold: np.ndarray
-    swinging: np.ndarray
-    failures: np.ndarray
+    time: np.ndarray  #: (n,) [s]
+    load: np.ndarray  #: (n, nu) |τ| of the motors over their limits
+    capture_point: np.ndarray  #: (n, 2) [m]
+    supports: list[np.ndarray]  #: n polygons (k, 2) of the support [m]
+    contacts: np.ndarray  #: (n, nc) whether each sole touches the ground
+    soles: np.ndarray  #: (n, nc, 2) their places [m]
+    foothold: np.ndarray  #: (n, 2) where the foot that swings is to land [m]; NaN: none swings
+    swinging: np.ndarray  #: (n,) that foot; −1: none
+    failures: np.ndarray  #: (n,) control ticks so far at which the controller's solver failed
 
 
 class CourseRecord:

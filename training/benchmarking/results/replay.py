@@ -29,18 +29,12 @@ NARROW = (480, 480)  # [pixels] of one of several
 
 @dataclass(frozen=True)
 class Replay:
-    """A trial played again.
-
-    Attributes:
-        trial: the trial.
-        controller: who played it.
-        outcome: of now.
-        differences: column of trials.csv → (recorded, now), for those that differ.
-    """
+    """A trial played again."""
 
     trial: Trial
-    controller: str
-    outcome: Outcome
+    controller: str  #: who played it
+    outcome: Outcome  #: of now
+    #: column of trials.csv → (recorded, now), for those that differ
     differences: dict[str, tuple[str, str]]
 
 

@@ -13,19 +13,12 @@ POINTS = 51  # of a curve over stance
 
 @dataclass(frozen=True)
 class KneeMoment:
-    """The knee's moment in the sagittal plane, extension positive, at points of stance.
+    """The knee's moment in the sagittal plane, extension positive, at points of stance."""
 
-    Attributes:
-        source: where the figures are from.
-        stance: rising from 0 to 100 [%].
-        mean: [N·m/kg].
-        half_width: of the band [N·m/kg].
-    """
-
-    source: str
-    stance: tuple[float, ...]
-    mean: tuple[float, ...]
-    half_width: tuple[float, ...]
+    source: str  #: where the figures are from
+    stance: tuple[float, ...]  #: rising from 0 to 100 [%]
+    mean: tuple[float, ...]  #: [N·m/kg]
+    half_width: tuple[float, ...]  #: of the band [N·m/kg]
 
     def __post_init__(self) -> None:
         if not len(self.stance) == len(self.mean) == len(self.half_width) >= 2:

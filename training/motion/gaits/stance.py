@@ -27,17 +27,11 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Stances:
-    """The stances of a walk.
+    """The stances of a walk."""
 
-    Attributes:
-        knees: (n, 51) τ/m [N·m/kg] over each stance, extension positive.
-        peaks: (n,) the largest vertical force of the ground in each, in m g.
-        height_amplitude: half of the way of the CoM up and down in a step, mean [m]; None if there
-            is no step.
-    """
-
-    knees: np.ndarray
-    peaks: np.ndarray
+    knees: np.ndarray  #: (n, 51) τ/m [N·m/kg] over each stance, extension positive
+    peaks: np.ndarray  #: (n,) the largest vertical force of the ground in each, in m g
+    #: half of the way of the CoM up and down in a step, mean [m]; None if there is no step
     height_amplitude: float | None
 
 
