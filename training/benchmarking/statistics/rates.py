@@ -11,9 +11,11 @@ import numpy as np
 import scipy  # loads its parts when they are first asked for
 from numpy.typing import ArrayLike
 
+CONFIDENCE = 0.95  # of every interval
+
 
 class Interval(NamedTuple):
-    """A confidence interval; a tuple, so that JSON writes it as [low, high]."""
+    """A 95 % confidence interval; a tuple, so that JSON writes it as [low, high]."""
 
     low: float
     high: float
@@ -30,25 +32,24 @@ class SeedFigures(TypedDict):
     worst_seed: int
 
 
-def poisson_interval(count: int, confidence: float = 0.95) -> Interval:
+def poisson_interval(count: int) -> Interval:
     """Garwood's exact interval of the mean of a Poisson distribution that gave `count`.
 
-        (χ²_{α/2}(2 count) / 2, χ²_{1−α/2}(2 count + 2) / 2),   α = 1 − confidence
+        (χ²_{α/2}(2 count) / 2, χ²_{1−α/2}(2 count + 2) / 2),   α = 0.05
 
     Divided by the time in which so many were counted, it is that of their rate.
 
     Raises:
-        ValueError: a negative count, or confidence outside (0, 1).
+        ValueError: a negative count.
     """
     if count < 0:
         raise ValueError(f"count must not be negative, got {count}")
-    check_confidence(confidence)
-    tail = 0.5 * (1.0 - confidence)
+    tail = 0.5 * (1.0 - CONFIDENCE)
     low = 0.0 if count == 0 else 0.5 * float(scipy.stats.chi2.ppf(tail, 2 * count))
     return Interval(low, 0.5 * float(scipy.stats.chi2.ppf(1.0 - tail, 2 * count + 2)))
 
 
-def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> Interval:
+def wilson_interval(successes: int, trials: int) -> Interval:
     """Wilson score interval of a proportion.
 
         (p̂ + z²/2n ± z √(p̂(1 − p̂)/n + z²/4n²)) / (1 + z²/n),   p̂ = successes / trials
@@ -57,14 +58,13 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> In
     gives (0, 1).
 
     Raises:
-        ValueError: not 0 <= successes <= trials, or confidence outside (0, 1).
+        ValueError: not 0 <= successes <= trials.
     """
     if not 0 <= successes <= trials:
         raise ValueError(f"successes must be within [0, trials], got {successes} of {trials}")
-    check_confidence(confidence)
     if trials == 0:
         return Interval(0.0, 1.0)
-    z = float(scipy.stats.norm.ppf(0.5 + confidence / 2))
+    z = float(scipy.stats.norm.ppf(0.5 + CONFIDENCE / 2))
     rate = successes / trials
     shrink = 1 + z**2 / trials
     centre = (rate + z**2 / (2 * trials)) / shrink
@@ -104,7 +104,7 @@ def iqm(scores: ArrayLike) -> float:
 
 
 def seed_aggregate(
-    scores: ArrayLike, *, resamples: int = 2000, confidence: float = 0.95, seed: int = 0
+    scores: ArrayLike, *, resamples: int = 2000, seed: int = 0
 ) -> tuple[float, Interval]:
     """IQM of scores over training seeds, with a stratified percentile bootstrap [Agarwal21].
 
@@ -117,7 +117,6 @@ def seed_aggregate(
     Raises:
         ValueError: no score, one that is not finite, or more than two axes.
     """
-    check_confidence(confidence)
     table = _finite(scores)
     if table.ndim > 2:
         raise ValueError(f"scores must have shape (seeds,) or (seeds, tasks), got {table.shape}")
@@ -126,7 +125,7 @@ def seed_aggregate(
     rows = np.random.default_rng(seed).integers(seeds, size=(resamples, seeds, tasks))
     drawn = np.take_along_axis(table[None], rows, axis=1)
     replicates = scipy.stats.trim_mean(drawn.reshape(resamples, -1), 0.25, axis=1)
-    return iqm(table), percentile_interval(replicates, confidence)
+    return iqm(table), percentile_interval(replicates)
 
 
 def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
@@ -144,9 +143,7 @@ def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
     }
 
 
-def percentile_interval(
-    replicates: np.ndarray, confidence: float = 0.95, *, freedom: tuple[int, int] | None = None
-) -> Interval:
+def percentile_interval(replicates: np.ndarray, freedom: tuple[int, int] | None = None) -> Interval:
     """Percentile bootstrap interval of replicates, shape (resamples,).
 
     Resampling n trials for an estimate with k parameters shows too little spread, by a factor of
@@ -154,7 +151,7 @@ def percentile_interval(
     the small sample, as a t interval is wider than a normal one ("expanded percentile interval",
     Hesterberg 2015): the tail is Φ(−√(n/(n − k)) t) with t of n − k degrees of freedom.
     """
-    tail = (1 - confidence) / 2
+    tail = (1 - CONFIDENCE) / 2
     if freedom is not None:
         n, k = freedom
         left = max(n - k, 1)
@@ -179,12 +176,6 @@ def eta(j50: ArrayLike, mass: float, limit: ArrayLike) -> np.ndarray:
     if not mass > 0 or not np.all(limit > 0):
         raise ValueError("mass and limit must be positive")
     return np.asarray(j50, dtype=float) / mass / limit
-
-
-def check_confidence(confidence: float) -> None:
-    """Raise ValueError unless 0 < confidence < 1."""
-    if not 0 < confidence < 1:
-        raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
 
 
 def _finite(scores: ArrayLike) -> np.ndarray:
