@@ -8,7 +8,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_folder
 from poise.configs.texts import code, plain
-from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_columns
+from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_cells
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
     AIMED,
@@ -140,23 +140,23 @@ def _shape(entry: Entry) -> tuple[list[float], list[int]]:
 
 
 def _ranking(summary: Summary) -> Table:
-    entries = summary["controllers"]
-    columns = [
-        (heading, text)
-        for heading, text in table_columns(summary)
+    entries, names = summary["controllers"], summary["ranking"]
+    cells = {
+        heading: texts
+        for heading, texts in table_cells(summary).items()
         if heading in COLUMNS and (summary["rated"] or heading != RECOVERED.heading)
-    ]  # else each of its own pushes
-    columns.append((CHATTER.heading, lambda name: CHATTER.text(entries[name])))
-    columns.insert(1, (J50_PER_MASS.unit, lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
-    at_levels = {name: dict(_realism(entries[name])) for name in summary["ranking"]}
-    levels = list(at_levels[summary["ranking"][0]])
+    }  # else each of its own pushes
+    per_mass = [f"{entries[name]['j50_mean_per_mass']:.2f}" for name in names]
+    cells = {J50_MEAN.heading: cells.pop(J50_MEAN.heading), J50_PER_MASS.unit: per_mass, **cells}
+    cells[CHATTER.heading] = [CHATTER.text(entries[name]) for name in names]
+    at_levels = [dict(_realism(entries[name])) for name in names]
+    cells |= {level: [own.get(level, NONE) for own in at_levels] for level in at_levels[0]}
     rank = places(entries)
     rows = [
-        [str(rank[name] or NONE), code(name), *(text(name) for _, text in columns),
-         *(cells.get(level, NONE) for level in levels)]
-        for name, cells in at_levels.items()
-    ]  # fmt: skip
-    return ["", "controller", *(heading for heading, _ in columns), *levels], rows
+        [str(rank[name] or NONE), code(name), *texts]
+        for name, texts in zip(names, zip(*cells.values(), strict=True), strict=True)
+    ]
+    return ["", "controller", *cells], rows
 
 
 def _realism(entry: Entry) -> Iterator[tuple[str, str]]:
