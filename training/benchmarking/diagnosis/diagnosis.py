@@ -58,13 +58,14 @@ def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagno
         start: of the first push or kick; 0 without one [s].
         loss: the criterion of a trial that did not end by a fall.
     """
-    found = Diagnosis(loss=loss)
-    if env.fallen:
-        found = _fall(env, loss)
-    for part in (_full(env, course, start), _capture(course), _foothold(course, start)):
-        found = replace(found, **part)
     failed = np.flatnonzero(course.failures > 0)
-    return replace(found, failures_from=_time(course, failed[0]) if len(failed) else None)
+    return replace(
+        _fall(env, loss) if env.fallen else Diagnosis(loss),
+        **_full(env, course, start),
+        **_capture(course),
+        **_foothold(course, start),
+        failures_from=_time(course, failed[0]) if len(failed) else None,
+    )
 
 
 def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
