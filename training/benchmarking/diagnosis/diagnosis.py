@@ -8,6 +8,7 @@ import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import has_diverged, uprightness
+from poise.envs.compiled.maths.runs import runs_of
 from poise.envs.robots.models.tree import lineage
 from poise.envs.robots.robot import Robot
 
@@ -97,22 +98,20 @@ def touching_body(env: BalanceEnv) -> str | None:
 def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
     """The motor that was first full, from when and for how long."""
     full = (course.load > FULL) & (course.time > start)[:, None] & bearing(env.robot)
-    runs = np.zeros(full.shape, dtype=int)  # rows in a row, the last one's included
-    for k in range(1, len(full)):
-        runs[k] = np.where(full[k], runs[k - 1] + 1, 0)
-    lasting = np.argwhere(runs == FULL_STEPS)
-    if not len(lasting):
+    lasting = [
+        (first, last, motor)
+        for motor in range(full.shape[1])
+        for first, last in runs_of(full[:, motor]).tolist()
+        if last - first >= FULL_STEPS
+    ]
+    if not lasting:
         return {}
-    row = lasting[:, 0].min()
-    motors = lasting[lasting[:, 0] == row, 1]
-    # rows until each is no longer full
-    lengths = {int(motor): int(np.argmin([*full[row:, motor], False])) for motor in motors}
-    motor = max(lengths, key=lambda each: lengths[each])
-    period = env.config.policy_period
+    # of those that begin together the longest
+    first, last, motor = min(lasting, key=lambda run: (run[0], -run[1]))
     return {
         "full_motor": env.robot.motor_names[motor],
-        "full_from": _time(course, row - FULL_STEPS + 1),
-        "full_time": round((lengths[motor] + FULL_STEPS - 1) * period, 6),
+        "full_from": _time(course, first),
+        "full_time": round((last - first) * env.config.policy_period, 6),
     }
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from poise.baselines.walking.models.legs import leg_arrays
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.compiled.maths.runs import runs_of
 from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.trials.gait_record import knee_motors
 
@@ -72,11 +73,8 @@ class StanceRecord:
 
 def _spans(down: np.ndarray, time: np.ndarray, since: float) -> list[tuple[int, int]]:
     """First row and row after the last one of whole stances of one foot."""
-    edges = np.flatnonzero(np.diff(down.astype(int)))
-    landed = [int(row) + 1 for row in edges if not down[row] and time[row + 1] >= since]
-    lifted = np.array([row + 1 for row in edges if down[row]], dtype=int)
-    spans = [(row, int(lifted[lifted > row][0])) for row in landed if np.any(lifted > row)]
-    return [(a, b) for a, b in spans if time[b] - time[a] >= SHORTEST]
+    whole = [(a, b) for a, b in runs_of(down).tolist() if a > 0 and b < len(down)]
+    return [(a, b) for a, b in whole if time[a] >= since and time[b] - time[a] >= SHORTEST]
 
 
 def _resampled(values: np.ndarray) -> np.ndarray:
