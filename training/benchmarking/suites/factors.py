@@ -67,7 +67,7 @@ class Factors(Part):
         trials: list[Trial] = []
         for cell in self._cells(draw):
             for k, (angle, fraction) in enumerate(drawn):
-                pushes = again(cell.push(draw, angle, fraction), cell.count, draw)
+                pushes = repeats_of(cell.push(draw, angle, fraction), cell.count, draw)
                 trial = draw.trial(
                     number + len(trials), pushes, factor=cell.factor, level=cell.level,
                     conditions=cell.conditions,
@@ -129,10 +129,10 @@ class Mix(Part):
             mass_error=float(rng.uniform(*self.mass_error)),
         )
         count = 2 if rng.uniform() < self.repeated else 1
-        return draw.trial(number, again(push, count, draw), conditions=conditions)
+        return draw.trial(number, repeats_of(push, count, draw), conditions=conditions)
 
 
-def again(push: Push, count: int, draw: Draw) -> list[Push]:
+def repeats_of(push: Push, count: int, draw: Draw) -> list[Push]:
     """The same push `count` times, the suite's interval from start to start."""
     interval = draw.standard.interval
     return [replace(push, start=push.start + k * interval) for k in range(count)]

@@ -108,7 +108,7 @@ class Plan:
     def second(self, finished: Finished) -> dict[str, list[Trial]]:
         """controller → its trials of the second stage; `finished` must hold all of the first."""
         chosen: dict[str, list[Trial]] = {name: [] for name in self.names}
-        for own, part, level, first, number, shift in self._parts:
+        for key, part, level, first, number, shift in self._parts:
             recovered = {
                 name: [
                     finished[name, trial.number].recovered
@@ -118,7 +118,7 @@ class Plan:
                 for name in self.names
             }
             for name, trials in part.second(self._draw, number, first, recovered).items():
-                chosen[name] += self._at(own, level, shift, trials)
+                chosen[name] += self._at(key, level, shift, trials)
         return chosen
 
     def trials(self, finished: Finished) -> dict[str, list[Trial]]:
