@@ -11,7 +11,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.easing import eased
 from poise.envs.compiled.maths.noise import uniform
 from poise.envs.robots.description import match_names
-from poise.envs.robots.model_check import lineage
+from poise.envs.robots.models.tree import lineage
 from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews

@@ -20,8 +20,8 @@ from .description import (
 )
 from .floors import check_ground, install_ground
 from .ground import can_touch
-from .model_check import lineage
 from .models.mjcf import pointing_to_scenes, read_mjcf
+from .models.tree import lineage
 from .models.urdf import read_urdf
 from .soles import find_sole_plane, sole_geoms
 from .standing import Stance, described_qpos

@@ -7,6 +7,7 @@ import numpy as np
 from poise.configs.errors import ConfigError, shown
 
 from .description import RobotDescription
+from .models.tree import lineage
 
 LARGEST = 1e9  # of a number that the motion depends on, SI units
 MOST_ITERATIONS = 1000  # of a solver, in a physics step
@@ -87,15 +88,6 @@ def _check_root(model: mujoco.MjModel, root: int) -> None:
                    "name the robot's own file instead of a scene")  # fmt: skip
         floating = []
     raise ConfigError(problem, field="root", choices=floating or None)
-
-
-def lineage(model: mujoco.MjModel, body: int) -> list[int]:
-    """A body, and those between it and the world, the nearest first."""
-    found = []
-    while body != 0:
-        found.append(body)
-        body = int(model.body_parentid[body])
-    return found
 
 
 def _named(model: mujoco.MjModel, joints: list[int]) -> str:

@@ -47,7 +47,7 @@ from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.tuning.search import tune_config
-from poise.training.motion.gaits.stance import load_knee_moment
+from poise.training.motion.gaits.knee_moment import load_knee_moment
 from tests.support.hangs import no_hang
 from tests.support.shared import robot
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import has_diverged, uprightness
+from poise.envs.compiled.maths.runs import runs_of
+from poise.envs.robots.models.tree import lineage
 from poise.envs.robots.robot import Robot
 
 from .record import Course
@@ -20,41 +22,28 @@ MISSED = 0.05  # [m] from where a foot lands to where it was to land
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Why a trial was lost; times in s after the reset, None where there is no such thing.
+    """Why a trial was lost; times in s after the reset, None where there is no such thing."""
 
-    Attributes:
-        loss: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far),
-            "contact" (more than the feet on the ground), "diverged" (numbers too large), "not
-            quiet" (on its feet, but not upright and at rest at the end), "off command" (a walk that
-            did not go on as commanded), "motion" (a fall from a motion), "error".
-        loss_body: body that touched the ground, where that is the criterion.
-        full_motor: motor between root and soles that was first at its limit after the first push,
-            for 2 policy steps or more in a row. Arms are swung as hard as they can be, which is no
-            reason to fall.
-        full_from: when that began.
-        full_time: how long it lasted then.
-        capture_left: when the capture point left the support for the last time.
-        capture_outside: how far outside it came at most from then on [m].
-        foothold: "slipped" (a sole moved by 3 cm while it stood) or "missed" (a foot landed 5 cm or
-            more from where it was to land), whichever came first.
-        foothold_time: when.
-        foothold_error: how far [m].
-        failures_from: when the controller's solver first failed.
-        hardware: what sensors or motors did where a suite's conditions say that they are not
-            perfect; in words.
-    """
-
+    #: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far), "contact"
+    #: (more than the feet on the ground), "diverged" (numbers too large), "not quiet" (on its feet,
+    #: but not upright and at rest at the end), "off command" (a walk that did not go on as
+    #: commanded), "motion" (a fall from a motion), "error"
     loss: str | None = None
-    loss_body: str | None = None
+    loss_body: str | None = None  #: that touched the ground, where that is the criterion
+    #: motor between root and soles that was first at its limit after the first push, for 2 policy
+    #: steps or more in a row. Arms are swung as hard as they can be, which is no reason to fall
     full_motor: str | None = None
-    full_from: float | None = None
-    full_time: float | None = None
-    capture_left: float | None = None
-    capture_outside: float | None = None
+    full_from: float | None = None  #: when that began
+    full_time: float | None = None  #: how long it lasted then
+    capture_left: float | None = None  #: when the capture point left the support for the last time
+    capture_outside: float | None = None  #: how far outside it came at most from then on [m]
+    #: "slipped" (a sole moved by 3 cm while it stood) or "missed" (a foot landed 5 cm or more from
+    #: where it was to land), whichever came first
     foothold: str | None = None
-    foothold_time: float | None = None
-    foothold_error: float | None = None
-    failures_from: float | None = None
+    foothold_time: float | None = None  #: when
+    foothold_error: float | None = None  #: how far [m]
+    failures_from: float | None = None  #: when the controller's solver first failed
+    #: what sensors or motors did where a suite's conditions say that they are not perfect; in words
     hardware: str | None = None
 
 
@@ -70,13 +59,14 @@ def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagno
         start: of the first push or kick; 0 without one [s].
         loss: the criterion of a trial that did not end by a fall.
     """
-    found = Diagnosis(loss=loss)
-    if env.fallen:
-        found = _fall(env, loss)
-    for part in (_full(env, course, start), _capture(course), _foothold(course, start)):
-        found = replace(found, **part)
     failed = np.flatnonzero(course.failures > 0)
-    return replace(found, failures_from=_time(course, failed[0]) if len(failed) else None)
+    return replace(
+        _fall(env, loss) if env.fallen else Diagnosis(loss),
+        **_full(env, course, start),
+        **_capture(course),
+        **_foothold(course, start),
+        failures_from=_time(course, failed[0]) if len(failed) else None,
+    )
 
 
 def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
@@ -108,34 +98,28 @@ def touching_body(env: BalanceEnv) -> str | None:
 def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
     """The motor that was first full, from when and for how long."""
     full = (course.load > FULL) & (course.time > start)[:, None] & bearing(env.robot)
-    runs = np.zeros(full.shape, dtype=int)  # rows in a row, the last one's included
-    for k in range(1, len(full)):
-        runs[k] = np.where(full[k], runs[k - 1] + 1, 0)
-    lasting = np.argwhere(runs == FULL_STEPS)
-    if not len(lasting):
+    lasting = [
+        (first, last, motor)
+        for motor in range(full.shape[1])
+        for first, last in runs_of(full[:, motor]).tolist()
+        if last - first >= FULL_STEPS
+    ]
+    if not lasting:
         return {}
-    row = lasting[:, 0].min()
-    motors = lasting[lasting[:, 0] == row, 1]
-    # rows until each is no longer full
-    lengths = {int(motor): int(np.argmin([*full[row:, motor], False])) for motor in motors}
-    motor = max(lengths, key=lambda each: lengths[each])
-    period = env.config.policy_period
+    # of those that begin together the longest
+    first, last, motor = min(lasting, key=lambda run: (run[0], -run[1]))
     return {
         "full_motor": env.robot.motor_names[motor],
-        "full_from": _time(course, row - FULL_STEPS + 1),
-        "full_time": round((lengths[motor] + FULL_STEPS - 1) * period, 6),
+        "full_from": _time(course, first),
+        "full_time": round((last - first) * env.config.policy_period, 6),
     }
 
 
 def bearing(robot: Robot) -> np.ndarray:
     """(nu,) whether a motor is between the root and a sole."""
     model = robot.model
-    between = set()
-    for sole in robot.soles:
-        body = sole.body_id
-        while body not in (0, robot.root_body_id):
-            between.add(body)
-            body = int(model.body_parentid[body])
+    limbs = {body for sole in robot.soles for body in lineage(model, sole.body_id)}
+    between = limbs - {*lineage(model, robot.root_body_id)}
     bodies = model.dof_bodyid[np.array(robot.motor_dofs)]
     return np.isin(bodies, list(between))
 

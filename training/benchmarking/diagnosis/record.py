@@ -1,6 +1,7 @@
 """What is kept of a trial at every policy step, so that its loss can be explained."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,29 +13,17 @@ from poise.envs.balance.episode import FAILURES
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """The course of a trial: n rows, one after the reset and one after every policy step.
+    """The course of a trial: n rows, one after the reset and one after every policy step."""
 
-    Attributes:
-        time: (n,) [s].
-        load: (n, nu) |τ| of the motors over their limits.
-        capture_point: (n, 2) [m].
-        supports: n polygons (k, 2) of the support [m].
-        contacts: (n, nc) whether each sole touches the ground.
-        soles: (n, nc, 2) their places [m].
-        foothold: (n, 2) where the foot that swings is to land [m]; NaN where none swings.
-        swinging: (n,) that foot; −1: none.
-        failures: (n,) control ticks so far at which the controller's solver failed.
-    """
-
-    time: np.ndarray
-    load: np.ndarray
-    capture_point: np.ndarray
-    supports: list[np.ndarray]
-    contacts: np.ndarray
-    soles: np.ndarray
-    foothold: np.ndarray
-    swinging: np.ndarray
-    failures: np.ndarray
+    time: np.ndarray  #: (n,) [s]
+    load: np.ndarray  #: (n, nu) |τ| of the motors over their limits
+    capture_point: np.ndarray  #: (n, 2) [m]
+    supports: list[np.ndarray]  #: n polygons (k, 2) of the support [m]
+    contacts: np.ndarray  #: (n, nc) whether each sole touches the ground
+    soles: np.ndarray  #: (n, nc, 2) their places [m]
+    foothold: np.ndarray  #: (n, 2) where the foot that swings is to land [m]; NaN: none swings
+    swinging: np.ndarray  #: (n,) that foot; −1: none
+    failures: np.ndarray  #: (n,) control ticks so far at which the controller's solver failed
 
 
 class CourseRecord:
@@ -44,9 +33,7 @@ class CourseRecord:
     """
 
     def __init__(self) -> None:
-        self._rows: list[tuple[float, ...]] = []
-        self._supports: list[np.ndarray] = []
-        self._arrays: list[tuple[np.ndarray, ...]] = []
+        self._rows: list[tuple[Any, ...]] = []  # one for each field of `Course`
         self._steps: SteppingController | None = None
 
     def __call__(self, env: BalanceEnv) -> None:
@@ -56,29 +43,20 @@ class CourseRecord:
             inner = getattr(inner, "unwrapped", inner)  # one from outside may be a bare object
             self._steps = inner if isinstance(inner, SteppingController) else None
             self._limit = np.array(env.robot.torque_limit)
-        foot, x, y = -1, np.nan, np.nan
+        foot, foothold = -1, (np.nan, np.nan)
         if self._steps is not None:
             step = self._steps.stepping()
             if (foot := step.foot) >= 0:
-                x, y = step.foothold
-        failures = env.episode.metrics[FAILURES]
-        self._rows.append((env.simulation.time, foot, x, y, failures))
-        self._supports.append(s.support[: s.support_size[0]].copy())
-        self._arrays.append((env.simulation.views.ctrl.copy(), s.capture_point.copy(),
-                             s.contacts.copy(), s.sole_point[:, :2].copy()))  # fmt: skip
+                foothold = tuple(step.foothold)
+        self._rows.append((
+            env.simulation.time, np.abs(env.simulation.views.ctrl) / self._limit,
+            s.capture_point.copy(), s.support[: s.support_size[0]].copy(), s.contacts > 0.5,
+            s.sole_point[:, :2].copy(), foothold, foot, float(env.episode.metrics[FAILURES]),
+        ))  # fmt: skip
 
     def course(self) -> Course:
         """What was kept, as arrays."""
-        rows = np.array(self._rows)
-        ctrl, capture_point, contacts, soles = map(np.array, zip(*self._arrays, strict=True))
-        return Course(
-            time=rows[:, 0],
-            load=np.abs(ctrl) / self._limit,
-            capture_point=capture_point,
-            supports=self._supports,
-            contacts=contacts > 0.5,
-            soles=soles,
-            foothold=rows[:, 2:4],
-            swinging=rows[:, 1].astype(int),
-            failures=rows[:, 4],
-        )
+        columns = dict(zip(Course.__dataclass_fields__, zip(*self._rows, strict=True), strict=True))
+        supports = list(columns.pop("supports"))
+        arrays = {name: np.array(column) for name, column in columns.items()}
+        return Course(supports=supports, **arrays)

@@ -32,28 +32,18 @@ Key = tuple[str, int]  # controller, number of the trial
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything that decides a result, but for the machine.
+    """Everything that decides a result, but for the machine."""
 
-    Attributes:
-        format: of the folder.
-        suite_name: as the user wrote it; `suite` holds its fields.
-        robot: name or path, as the user wrote it; `robot_fingerprint` of what was loaded.
-        seed: of the trials.
-        limits: what pushes are measured by; None: the ankle limit.
-        versions: of what computes the result.
-        controllers: name → fingerprint, in the order in which they came.
-        motions: name → hash of the motions that are performed.
-    """
-
-    format: int
-    suite_name: str
-    suite: dict[str, Any]
-    robot: str
-    robot_fingerprint: str
-    seed: int = field(metadata={"min": 0})
-    limits: LimitTable | None
-    versions: dict[str, str]
-    controllers: dict[str, str]
+    format: int  #: of the folder
+    suite_name: str  #: as the user wrote it
+    suite: dict[str, Any]  #: its fields
+    robot: str  #: name or path, as the user wrote it
+    robot_fingerprint: str  #: of what was loaded
+    seed: int = field(metadata={"min": 0})  #: of the trials
+    limits: LimitTable | None  #: what pushes are measured by; None: the ankle limit
+    versions: dict[str, str]  #: of what computes the result
+    controllers: dict[str, str]  #: name → fingerprint, in the order in which they came
+    #: name → hash of the motions that are performed
     motions: dict[str, str] = field(default_factory=dict, metadata={"omit": "default"})
 
 

@@ -1,7 +1,8 @@
 """A result for people: tables in the terminal, what their words mean, rows of the leaderboard."""
 
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -28,7 +29,6 @@ from poise.training.running.columns import (
     RECOVERED,
     ROBUST,
     STEPS_TAKEN,
-    Figure,
     known,
 )
 from poise.training.running.summary import Entry, Summary
@@ -52,14 +52,17 @@ def ranked(entries: Mapping[str, Entry]) -> list[str]:
     return sorted(entries, key=lambda name: (assisted(entries[name]), -_value(entries[name], key)))
 
 
-def places(entries: Mapping[str, Entry]) -> dict[str, int | None]:
+def places(
+    entries: Mapping[str, Entry], measure: tuple[str, str] | None = None
+) -> dict[str, int | None]:
     """The rank of each controller; those whose results print alike share one.
 
-    None for those that took a force from nowhere.
+    None for those that took a force from nowhere, or have no value of the `measure`: a key and the
+    form in which it is printed, by default what they are `ranked` by.
     """
-    key, form = _measure(entries)
-    shown = {name: float(format(_value(entry, key), form))
-             for name, entry in entries.items() if not assisted(entry)}  # fmt: skip
+    key, form = measure or _measure(entries)
+    shown = {name: float(format(_value(entry, key), form)) for name, entry in entries.items()
+             if key in entry and not assisted(entry)}  # fmt: skip
     better = {name: sum(other > value for other in shown.values()) for name, value in shown.items()}
     return {name: better[name] + 1 if name in better else None for name in entries}
 
@@ -85,15 +88,13 @@ def print_summary(summary: Summary, console: Console) -> None:
     """Tables of the controllers and of the pairs, errors, a line per group of training seeds."""
     robot = summary["robot"]["name"]
     title = escape(f"{summary['suite']} · {robot} · seed {summary['seed']}")
-    columns = [
-        (heading, text)
-        for heading, text in table_columns(summary)
-        if heading not in IN_PAIRS
-        and not {text(name) for name in summary["ranking"]} <= {NONE, "0"}
-    ]
+    cells = {
+        heading: texts
+        for heading, texts in table_cells(summary).items()
+        if heading not in IN_PAIRS and not {*texts} <= {NONE, "0"}
+    }
     names, rank = summary["ranking"], places(summary["controllers"])
     named = _room(names, 16)
-    cells = {heading: [text(name) for name in names] for heading, text in columns}
     for k, part in enumerate(in_parts(cells, console.width - named - 2 * BESIDE - 3)):
         table = Table(title=None if k else title, title_justify="left")
         table.add_column("#", justify="right")
@@ -108,8 +109,7 @@ def print_summary(summary: Summary, console: Console) -> None:
         console.print(each)
     if summary["pairs"]:
         console.print(_pairs(summary, console.width))
-    notes = _notes(summary, [heading for heading, _ in columns])
-    for line in (*notes, *seed_lines(summary["seeds"])):
+    for line in (*_notes(summary, [*cells]), *seed_lines(summary["seeds"])):
         console.print(line, markup=False, highlight=False)
     for name, entry in summary["controllers"].items():
         if entry["errors"]:
@@ -164,27 +164,22 @@ def print_lost(
             console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
 
-def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
-    """Headings, and the text of each for a controller; "–" where it has no such value."""
-    entries = summary["controllers"]
-    pairs = {p["b"]: p for p in summary["pairs"] if p["a"] == summary["reference"]}
+def table_cells(summary: Summary) -> dict[str, list[str]]:
+    """Heading → the text of each controller, in the order of the ranking; "–" where it has none."""
+    pairs = {pair["b"]: pair for pair in summary["pairs"] if pair["a"] == summary["reference"]}
+    entries = [summary["controllers"][name] for name in summary["ranking"]]
+    told = [{**summary["controllers"][name], **pairs.get(name, {})} for name in summary["ranking"]]
     of_mix = f" of the {summary['rated']}" if summary["rated"] else ""
-
-    def column(figure: Figure, name: str = "") -> tuple[str, Callable[[str], str]]:
-        return name or figure.heading, lambda name: figure.text(entries[name])
-
-    def beside(figure: Figure) -> tuple[str, Callable[[str], str]]:
-        return figure.heading, lambda name: figure.text(pairs.get(name, {}))
-
-    return [
-        (J50_MEAN.heading, lambda name: j50_mean_text(entries[name])),
-        *map(column, (J50_WORST, ETA_MEAN, ETA_WORST)),
-        column(HALF_AT, f"{HALF_AT.name}, of {summary['scale']}"),
-        column(RECOVERED, f"{RECOVERED.name}{of_mix}"),
-        column(NEVER_FELL),
-        *map(beside, (LOST_WON, P_VALUE)),
-        *map(column, (*AT_REST, STEPS_TAKEN, *ROBUST)),
-    ]
+    figures = (
+        *(J50_WORST, ETA_MEAN, ETA_WORST),
+        replace(HALF_AT, name=f"{HALF_AT.name}, of {summary['scale']}"),
+        replace(RECOVERED, name=f"{RECOVERED.name}{of_mix}"),
+        *(NEVER_FELL, LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
+    )
+    return {
+        J50_MEAN.heading: [j50_mean_text(entry) for entry in entries],
+        **{each.heading: [each.text(entry) for entry in told] for each in figures},
+    }
 
 
 def j50_mean_text(entry: Entry) -> str:

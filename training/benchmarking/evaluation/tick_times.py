@@ -1,11 +1,14 @@
 """The time of a control tick is measured here, of all controllers in turn in one process."""
 
+import contextlib
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
 from poise.baselines.controller import Controller, Targets, WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.trials.agents import Agent
@@ -29,6 +32,21 @@ class Clocked(WrappedController):
             self.seconds.append(time.perf_counter() - begun)
 
 
+@contextlib.contextmanager
+def clocked(env: BalanceEnv) -> Iterator[list[float]]:
+    """The seconds that each call of the environment's controller takes, as long as this is open;
+    none of an environment without one."""
+    if not isinstance(env, ResidualBalanceEnv):
+        yield []
+        return
+    inner = env.controller
+    clock = env.controller = Clocked(inner, env.robot)
+    try:
+        yield clock.seconds
+    finally:
+        env.controller = inner
+
+
 def tick_times(agents: dict[str, Agent]) -> dict[str, float | None]:
     """Median time of a control tick [µs] from Python; None for a controller that raises.
 
@@ -37,23 +55,20 @@ def tick_times(agents: dict[str, Agent]) -> dict[str, float | None]:
     clocks = {name: _Clock(agent) for name, agent in agents.items()}
     for turn in range(ROUNDS):
         for clock in clocks.values():
-            clock.play(seed=turn)
+            with contextlib.suppress(Exception):  # its trials say what it raised
+                clock.play(seed=turn)
     return {name: clock.median() for name, clock in clocks.items()}
 
 
 class _Clock:
     def __init__(self, agent: Agent):
-        self.agent, self.broken = agent, False
+        self.agent, self.rounds = agent, 0
         self.acts: list[float] = []
         self.ticks: list[float] = []
 
     def play(self, seed: int) -> None:
         env = self.agent.env
-        inner = env.controller if isinstance(env, ResidualBalanceEnv) else None
-        try:
-            clocked = None
-            if isinstance(env, ResidualBalanceEnv):
-                clocked = env.controller = Clocked(env.controller, env.robot)
+        with clocked(env) as seconds:
             push = {"specific_impulse": 0.2, "start": 0.05}
             observation, _ = env.reset(seed=seed, options={"push": push})
             for _ in range(round(SECONDS / env.config.policy_period)):
@@ -64,16 +79,11 @@ class _Clock:
                 observation = env.episode.observation.astype(np.float32)
                 if env.fallen:
                     break
-            if clocked is not None:
-                self.ticks += clocked.seconds
-        except Exception:  # its trials say what it raised
-            self.broken = True
-        finally:
-            if isinstance(env, ResidualBalanceEnv) and inner is not None:
-                env.controller = inner
+        self.ticks += seconds
+        self.rounds += 1
 
     def median(self) -> float | None:
-        if self.broken or not self.acts:
+        if self.rounds < ROUNDS or not self.acts:
             return None
         env = self.agent.env
         ticks = env.ticks if isinstance(env, ResidualBalanceEnv) else 1

@@ -1,35 +1,42 @@
 """A controller's entry of summary.json is computed here."""
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
 import numpy as np
 
 from poise.training.benchmarking.diagnosis.words import losses
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
+from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.statistics.eurobench import HUMAN_COM_HEIGHT
 from poise.training.benchmarking.statistics.fits import fit_logistic
 from poise.training.benchmarking.statistics.rates import eta
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import Plan, at_level
 from poise.training.benchmarking.suites.scenarios import PART as SCENARIOS
+from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit
-from poise.training.benchmarking.trials.trial import Outcome
 from poise.training.running.summary import (
     Direction,
     Entry,
     EnvelopeFigures,
     Fractions,
+    RealismLevel,
     RobotFigures,
     ScenarioFigures,
     Sector,
 )
 
 from .factors import eurobench_figures, factor_figures
-from .levels import level_figures
 from .motions import in_motion, motion_levels
 from .played import (
     DIRECTIONAL,
     Played,
     ankle_limits,
+    cells,
     counts,
+    fitted,
     fractions,
     once,
     part,
@@ -39,6 +46,8 @@ from .played import (
     won,
 )
 from .walking import phase_figures, walk_levels
+
+RANDOM = ("random", "mix")  # parts that the rates of a level are of, where a suite has one
 
 
 def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None) -> Entry:
@@ -69,7 +78,7 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
     if part(played, "envelope", "margin"):
         entry["eurobench"] = eurobench_figures(played, plan.limits)
     if plan.suite.levels:
-        entry["levels"] = level_figures(everything, plan.suite)
+        entry["levels"] = _levels(everything, plan.suite)
     return entry
 
 
@@ -84,14 +93,10 @@ def envelope(
     etas = mean_over_directions(direction, over_limit, recovered)
     ankle = [limits.ankle(angle, float(duration[0])) for angle in fit.directions]
     eta_values = eta([f.fit.j50 for f in fit.fits], mass, np.array(ankle) / mass)
-    directions: list[Direction] = [
+    directions = [
         {
             "direction": angle,
-            "trials": f.fit.trials,
-            "recovered": f.fit.recovered,
-            "j50": f.fit.j50,
-            "j50_ci95": f.j50_ci,
-            "j50_bound": f.fit.bound,
+            **fitted(f, "j50"),
             "j50_per_mass": f.fit.j50 / mass,
             "j90": f.fit.j90,
             "j90_ci95": f.j90_ci,
@@ -115,7 +120,7 @@ def envelope(
         "eta_mean": float(np.mean(eta_values)),
         "eta_mean_ci95": etas.j50_mean_ci,
         "eta_min": float(np.min(eta_values)),
-        "directions": directions,
+        "directions": cast(list[Direction], directions),
     }
     if steps is not None:
         steps.add_to(figures, float(duration[0]))
@@ -124,36 +129,60 @@ def envelope(
 
 def _fractions(played: Played, limits: PushLimits) -> Fractions:
     fit, by_sector = fit_logistic(fractions(played), won(played)), sectors(played)
-    found: list[Sector] = [
-        {
-            "direction": angle,
-            "trials": f.fit.trials,
-            "recovered": f.fit.recovered,
-            "fraction50": f.fit.j50,
-            "fraction50_ci95": f.j50_ci,
-            "fraction50_bound": f.fit.bound,
-        }
+    found = [
+        {"direction": angle, **fitted(f, "fraction50")}
         for angle, f in zip(by_sector.directions, by_sector.fits, strict=True)
     ]
     return {
         "fraction_of": limits.scale,
         "fraction50": fit.j50,
         "fraction50_bound": fit.bound,
-        "sectors": found,
+        "sectors": cast(list[Sector], found),
     }
 
 
 def _scenarios(played: Played) -> list[ScenarioFigures]:
     """Of each scenario that a controller has played, in the order of the suite."""
-    cells: dict[str, list[Outcome]] = {}
-    for trial, outcome in played:
-        cells.setdefault(str(trial.level), []).append(outcome)
     found: list[ScenarioFigures] = []
-    for name, outcomes in cells.items():
+    for name, outcomes in cells(played, lambda trial: str(trial.level)).items():
         figures: ScenarioFigures = {"scenario": name, **counts(outcomes)}
         if speeds := [o.speed_ahead for o in outcomes if o.speed_ahead is not None]:
             figures["speed_ahead"] = sum(speeds) / len(speeds)
         found.append(figures)
+    return found
+
+
+def _levels(played: Played, suite: Suite) -> list[RealismLevel]:
+    """Of the suite's own level, then of each of its `levels`; J50 also over that of the first."""
+
+    def named(names: Sequence[str], level: str | None) -> Played:
+        return part(played, *(n if level is None else at_level(n, level) for n in names))
+
+    found: list[RealismLevel] = []
+    for level in (None, *suite.levels):
+        every = named([name for name in suite.parts if name != "factors"], level)
+        counted = counts([outcome for _, outcome in named(RANDOM, level) or every])
+        here: RealismLevel = {
+            "level": Path(level or suite.realism).stem,
+            "trials": counted["trials"],
+            "recovered": counted["recovered"],
+            "recovered_rate": counted["recovered_rate"],
+            "recovered_ci95": counted["recovered_ci95"],
+            "torque_variation_median": counted["torque_variation_median"],
+            "energy_median": counted["energy_median"],
+        }
+        if quiet := named(["quiet"], level):
+            stood = [not outcome.fallen and outcome.error is None for _, outcome in quiet]
+            here["stood"], here["unpushed"] = sum(stood), len(stood)
+        if aimed := named(DIRECTIONAL, level):
+            direction, impulse, _ = pushes(aimed)
+            fit = mean_over_directions(direction, impulse, won(aimed))
+            here["j50_mean"], here["j50_mean_ci95"] = fit.j50_mean, fit.j50_mean_ci
+            if found:
+                first = found[0]["j50_mean"], found[0]["j50_mean_ci95"]
+                kept = ratio(*first, fit.j50_mean, fit.j50_mean_ci)
+                here["j50_kept"], here["j50_kept_ci95"] = kept
+        found.append(here)
     return found
 
 

@@ -14,19 +14,18 @@ from poise.training.benchmarking.suites.factors import STANDARD
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.running.summary import Eurobench, Factor, Level, MarginFigures
 
-from .played import Played, part, pushes, rate, won
+from .played import Played, cells, part, pushes, rate, won
 
 NAMED = ("body", "realism")  # factors whose levels are names, not numbers
 
 
 def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
     """Recovered rate of every level, and what it lost and won against the standard case."""
-    cells: dict[tuple[str, str], list[bool]] = {}
-    for trial, outcome in played:
-        cells.setdefault((str(trial.factor), str(trial.level)), []).append(outcome.recovered)
-    base = cells.pop((STANDARD, STANDARD), [])
+    outcomes = cells(played, lambda trial: (str(trial.factor), str(trial.level)))
+    recoveries = {cell: [outcome.recovered for outcome in own] for cell, own in outcomes.items()}
+    base = recoveries.pop((STANDARD, STANDARD), [])
     found: dict[str, list[Level]] = {}
-    for (factor, level), recovered in cells.items():
+    for (factor, level), recovered in recoveries.items():
         found.setdefault(factor, []).append(_level(level, recovered, base))
     for factor, levels in found.items():
         levels.append({**_level(standard[factor], base, base), "standard": True})
@@ -45,7 +44,7 @@ def _level(level: str, recovered: Sequence[bool], base: Sequence[bool]) -> Level
         **rate(recovered),
         "lost": lost,
         "won": gained,
-        "p_mcnemar": mcnemar(lost, gained).p_value,
+        "p_mcnemar": mcnemar(lost, gained),
     }
 
 

@@ -2,16 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from poise.envs.robots.robot import Robot
-from poise.training.benchmarking.statistics.bootstrap import (
-    DirectionFit,
-    EnvelopeFit,
-    mean_over_directions,
-)
+from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
+from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.statistics.rates import mean_or_none, wilson_interval
 from poise.training.benchmarking.suites.motions import PART, STANDING
 from poise.training.benchmarking.suites.suite import Suite
@@ -24,9 +21,9 @@ from poise.training.motion.following.repertoire import (
     kept,
     load_repertoire,
 )
-from poise.training.running.summary import InMotion, Interval, MotionLevel, MotionMeans
+from poise.training.running.summary import InMotion, MotionLevel, MotionMeans
 
-from .played import Played, part, pushes, ratio, won
+from .played import Played, cells, fitted, part, pushes, won
 
 MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level has the mean of
 
@@ -50,15 +47,13 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
 
 def motion_levels(played: Played) -> list[MotionLevel]:
     """Every share of J50: each motion, and all of several; [] where nothing is performed."""
-    cells: dict[tuple[float, str | None], list[Outcome]] = {}
     moving = part(played, PART)
-    several = len({trial.motion for trial, _ in moving}) > 1
-    for trial, outcome in moving:
-        assert trial.share is not None  # of this part all have one
-        for name in (trial.motion, None) if several else (trial.motion,):
-            cells.setdefault((trial.share, name), []).append(outcome)
-    ordered = sorted(cells, key=lambda key: (key[0], key[1] is None))
-    return [_level(*key, cells[key]) for key in ordered]
+    found: dict[tuple[float, str | None], list[Outcome]] = {}
+    found |= cells(moving, lambda trial: (trial.share or 0.0, trial.motion))
+    if len({trial.motion for trial, _ in moving}) > 1:
+        found |= cells(moving, lambda trial: (trial.share or 0.0, None))
+    ordered = sorted(found, key=lambda key: (key[0], key[1] is None))
+    return [_level(*key, found[key]) for key in ordered]
 
 
 def _level(share: float, name: str | None, outcomes: Sequence[Outcome]) -> MotionLevel:
@@ -93,10 +88,20 @@ def in_motion(played: Played) -> list[InMotion]:
     standing = _standing(played, moving)
     found: list[InMotion] = []
     if standing is not None:
-        found.append(_row(STANDING, standing.fits[0], None))
-    found += [_row(name, one, standing) for name, one in zip(names, fit.fits, strict=True)]
+        found.append(_row(STANDING, fitted(standing.fits[0], "share50"), None))
+    found += [
+        _row(name, fitted(one, "share50"), standing)
+        for name, one in zip(names, fit.fits, strict=True)
+    ]
     if len(names) > 1:
-        found.append(_mean_row(fit, won(moving), standing))
+        mean = {
+            "trials": len(moving),
+            "recovered": int(won(moving).sum()),
+            "share50": fit.j50_mean,
+            "share50_ci95": fit.j50_mean_ci,
+            "share50_bound": next((f.fit.bound for f in fit.fits if f.fit.bound), None),
+        }
+        found.append(_row(None, mean, standing))
     return found
 
 
@@ -111,38 +116,11 @@ def _standing(played: Played, moving: Played) -> EnvelopeFit | None:
     return mean_over_directions(np.zeros(len(over)), over, won(stood))
 
 
-def _row(name: str | None, one: DirectionFit, standing: EnvelopeFit | None) -> InMotion:
-    over, ends = _over(standing, one.fit.j50, one.j50_ci)
-    return {
-        "motion": name,
-        "trials": one.fit.trials,
-        "recovered": one.fit.recovered,
-        "share50": one.fit.j50,
-        "share50_ci95": one.j50_ci,
-        "share50_bound": one.fit.bound,
-        "over_standing": over,
-        "over_standing_ci95": ends,
-    }
-
-
-def _mean_row(fit: EnvelopeFit, recovered: np.ndarray, standing: EnvelopeFit | None) -> InMotion:
-    over, ends = _over(standing, fit.j50_mean, fit.j50_mean_ci)
-    return {
-        "motion": None,
-        "trials": len(recovered),
-        "recovered": int(recovered.sum()),
-        "share50": fit.j50_mean,
-        "share50_ci95": fit.j50_mean_ci,
-        "share50_bound": next((f.fit.bound for f in fit.fits if f.fit.bound), None),
-        "over_standing": over,
-        "over_standing_ci95": ends,
-    }
-
-
-def _over(
-    standing: EnvelopeFit | None, share: float, ends: Interval
-) -> tuple[float | None, Interval | None]:
-    """A share over that of standing, with its interval; None where there is none."""
-    if standing is None:
-        return None, None
-    return ratio(standing.j50_mean, standing.j50_mean_ci, share, ends)
+def _row(name: str | None, figures: dict[str, Any], standing: EnvelopeFit | None) -> InMotion:
+    """The figures of a motion, and its share over that of standing, if there is one."""
+    over, ends = None, None
+    if standing is not None:
+        here = figures["share50"], figures["share50_ci95"]
+        over, ends = ratio(standing.j50_mean, standing.j50_mean_ci, *here)
+    row = {"motion": name, **figures, "over_standing": over, "over_standing_ci95": ends}
+    return cast(InMotion, row)

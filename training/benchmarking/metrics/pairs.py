@@ -1,12 +1,13 @@
 """Two controllers compared: on the trials that both met, and by their mean J50."""
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 
 from poise.training.benchmarking.statistics.bootstrap import j50_gain
 from poise.training.benchmarking.statistics.differences import paired_rates, relative_gain
 from poise.training.benchmarking.statistics.rates import mcnemar
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.running.summary import Entry, Pair, Paired, both_ends
+from poise.training.running.summary import Entry, Pair, Paired
 
 from .played import DIRECTIONAL, Played, part, pushes, rated, won
 
@@ -21,8 +22,8 @@ def pair_figures(
     met = alike(played[a], played[b])
     every, rated_numbers = paired(met), {trial.number for trial, _ in rated(played[a])}
     pair: Pair = {"a": a, "b": b, "all": every}
-    if counted := paired([each for each in met if each[0].number in rated_numbers]):
-        pair |= counted
+    if own := paired([each for each in met if each[0].number in rated_numbers]):
+        pair |= own
     pair["identical"] = len(met) == len(played[a]) == len(played[b]) and all(
         one == two for _, one, two in met
     )
@@ -43,19 +44,23 @@ def alike(a: Played, b: Played) -> list[tuple[Trial, Outcome, Outcome]]:
 
 def paired(met: list[tuple[Trial, Outcome, Outcome]]) -> Paired | None:
     """Counts of the trials that both met; None without any."""
-    if not met:
+    return counted((one.recovered, two.recovered) for _, one, two in met)
+
+
+def counted(recovered: Iterable[tuple[bool, bool]]) -> Paired | None:
+    """Counts of trials by who recovered them, a or b, with McNemar's test of them."""
+    found = Counter(recovered)
+    if not found:
         return None
-    table = {(True, True): 0, (True, False): 0, (False, True): 0, (False, False): 0}
-    for _, one, two in met:
-        table[one.recovered, two.recovered] += 1
-    both, only_a, only_b, neither = table.values()
+    both, only_a = found[True, True], found[True, False]
+    only_b, neither = found[False, True], found[False, False]
     rate, interval = paired_rates(both, only_a, only_b, neither)
     return {
         "both": both,
         "only_a": only_a,
         "only_b": only_b,
         "neither": neither,
-        "p_mcnemar": mcnemar(only_a, only_b).p_value,
+        "p_mcnemar": mcnemar(only_a, only_b),
         "rate_gain": rate,
         "rate_gain_ci95": interval,
     }
@@ -73,7 +78,6 @@ def _add_gain(pair: Pair, directional: list[Played], entries: Mapping[str, Entry
         ]
         return
     one, two = entries[pair["a"]], entries[pair["b"]]
-    around = both_ends(one["j50_mean_ci95"]), both_ends(two["j50_mean_ci95"])
-    if around[0] is not None and around[1] is not None:
-        found = relative_gain(one["j50_mean"], around[0], two["j50_mean"], around[1])
-        pair["j50_gain"], pair["j50_gain_ci95"] = found
+    pair["j50_gain"], pair["j50_gain_ci95"] = relative_gain(
+        one["j50_mean"], one["j50_mean_ci95"], two["j50_mean"], two["j50_mean_ci95"]
+    )

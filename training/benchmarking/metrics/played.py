@@ -1,17 +1,22 @@
 """Trials of one controller with their outcomes, as arrays and in parts."""
 
 from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
-from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
-from poise.training.benchmarking.statistics.differences import relative_gain
+from poise.training.benchmarking.statistics.bootstrap import (
+    DirectionFit,
+    EnvelopeFit,
+    mean_over_directions,
+)
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.running.summary import Counts, Interval, Rate, both_ends
+from poise.training.running.summary import Counts, Rate
 
+Key = TypeVar("Key")
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
 RATED = ("mix", "motions")  # parts that the counts are of, where a suite has one
 DIRECTIONAL = ("envelope", "grid", "walk_push")  # parts that J50 of each direction is fitted to
@@ -31,6 +36,14 @@ def once(played: Played) -> Played:
 def rated(played: Played) -> Played:
     """The trials that a controller is rated by: those of the mix, else all that is played once."""
     return part(played, *RATED) or once(played)
+
+
+def cells(played: Played, key: Callable[[Trial], Key]) -> dict[Key, list[Outcome]]:
+    """The outcomes of the trials that have this in common, in the order of the first of them."""
+    found: dict[Key, list[Outcome]] = {}
+    for trial, outcome in played:
+        found.setdefault(key(trial), []).append(outcome)
+    return found
 
 
 def pushes(played: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,6 +68,18 @@ def sectors(played: Played) -> EnvelopeFit:
     direction, _, _ = pushes(played)
     middle = SECTOR * (np.rint(direction / SECTOR) % (360.0 / SECTOR))
     return mean_over_directions(middle, fractions(played), won(played))
+
+
+def fitted(one: DirectionFit, name: str) -> dict[str, Any]:
+    """What half of some trials recover, by this name, with its interval and what it is a bound of,
+    and how many they are."""
+    return {
+        "trials": one.fit.trials,
+        "recovered": one.fit.recovered,
+        name: one.fit.j50,
+        f"{name}_ci95": one.j50_ci,
+        f"{name}_bound": one.fit.bound,
+    }
 
 
 def rate(recovered: Sequence[bool]) -> Rate:
@@ -120,16 +145,3 @@ def lost(played: Played) -> list[int]:
     """The numbers of the trials of the suite's own level that were not recovered, rising: those
     whose causes are counted."""
     return [trial.number for trial, outcome in once(played) if not outcome.recovered]
-
-
-def ratio(
-    a: float, a_ci: Interval | None, b: float, b_ci: Interval | None
-) -> tuple[float | None, Interval | None]:
-    """b/a with its interval; None where an end of an interval is open or not > 0."""
-    one, two = both_ends(a_ci), both_ends(b_ci)
-    if one is None or two is None:
-        return None, None
-    gain, around = relative_gain(a, one, b, two)
-    if gain is None or around is None:
-        return None, None
-    return 1.0 + gain, (1.0 + around[0], 1.0 + around[1])

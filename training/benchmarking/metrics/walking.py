@@ -21,7 +21,7 @@ from poise.training.running.summary import (
     WalkMeans,
 )
 
-from .played import Played, part, rate
+from .played import Played, cells, part, rate
 
 PHASES = 8  # of a stride
 AS_TOLD = 0.1  # of a step parameter, within which a walk follows its command
@@ -31,10 +31,8 @@ MEANS = tuple(WalkMeans.__annotations__)
 
 def walk_levels(played: Played, duration: float) -> list[WalkLevel]:
     """The levels of the parts that walk, in the order of the suite; trials last `duration` [s]."""
-    cells: dict[tuple[str, str], list[Outcome]] = {}
-    for trial, outcome in part(played, *WALKING):
-        cells.setdefault((trial.part, str(trial.level)), []).append(outcome)
-    return [_level(*key, outcomes, duration) for key, outcomes in cells.items()]
+    found = cells(part(played, *WALKING), lambda trial: (trial.part, str(trial.level)))
+    return [_level(*key, outcomes, duration) for key, outcomes in found.items()]
 
 
 def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -> WalkLevel:

@@ -9,8 +9,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from poise.training.benchmarking.evaluation.folder import Settings
-from poise.training.benchmarking.statistics.differences import difference, paired_rates
-from poise.training.benchmarking.statistics.rates import mcnemar
+from poise.training.benchmarking.metrics.pairs import counted
+from poise.training.benchmarking.statistics.differences import difference
 from poise.training.running.columns import ETA_MEAN, J50_MEAN, RECOVERED
 from poise.training.running.summary import Entry, Interval, Level, Rate, both_ends
 
@@ -163,21 +163,21 @@ def _rates(
 ) -> Iterator[Change]:
     """A recovered rate: in pairs if both played the same trials, else by intervals."""
     required = {"factor": factor, "level": level, "part": part}
-    table = {(x, y): 0 for x in (True, False) for y in (True, False)}
     others = _outcomes(b, name)
-    for record in a.of(name):
-        here = all(value is None or record.line[key] == value for key, value in required.items())
-        if here and record.met in others:
-            table[record.recovered, others[record.met]] += 1
-    both, only_a, only_b, neither = table.values()
-    if not sum(table.values()) == one["trials"] == two["trials"]:
+    pairs = [
+        (record.recovered, others[record.met])
+        for record in a.of(name)
+        if record.met in others
+        and all(value is None or record.line[key] == value for key, value in required.items())
+    ]
+    found = counted(pairs)
+    if found is None or not len(pairs) == one["trials"] == two["trials"]:
         estimates = ((r["recovered_rate"], r["recovered_ci95"]) for r in (one, two))
         yield from _by_intervals(name, title, *estimates)
         return
-    change, (low, high) = paired_rates(both, only_a, only_b, neither)
-    note = f"{only_a} lost, {only_b} won, p = {mcnemar(only_a, only_b).p_value:.2g}"
+    note = f"{found['only_a']} lost, {found['only_b']} won, p = {found['p_mcnemar']:.2g}"
     rates = one["recovered_rate"], two["recovered_rate"]
-    yield Change(name, title, *rates, change, low, high, note)
+    yield Change(name, title, *rates, found["rate_gain"], *found["rate_gain_ci95"], note)
 
 
 def _levels(one: Entry, two: Entry) -> Iterator[tuple[tuple[str, str], Level, Level]]:

@@ -1,16 +1,17 @@
 """The leaderboard pages, generated from committed files summary.json."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_folder
-from poise.configs.texts import code, markdown_table, plain
-from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_columns
+from poise.configs.texts import code, plain
+from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_cells
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
+    AIMED,
     CHATTER,
     ETA_MEAN,
     ETA_WORST,
@@ -21,37 +22,22 @@ from poise.training.running.columns import (
     RECOVERED,
     ROOT,
     TICK,
-    Figure,
     known,
 )
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
 
+from .pages import Table, check_alike, direction_table, page_of
 from .scenario_page import is_of_scenarios, scenario_page
 from .summary import read_summary
 from .walking_leaderboard import is_of_walks, walking_leaderboard
 
 PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard.md")
 SCENARIO_PAGE = Path("docs/scenarios.md")
-HEAD = """# Leaderboard{of}
-
-<!-- Written by `poise leaderboard {source}`: change the result, not this page. -->
-
-Suite {suite}, robot {robot}, seed {seed}; Poise {poise}, MuJoCo {mujoco}, commit {commit};
-{processor}, {cores} cores. Intervals are 95 %; what the columns mean: [benchmark.md](benchmark.md).
-`lost, won` and McNemar's p are against {reference} on the {paired}. `root [N]` is the largest
-force that a controller took from nowhere: only those with 0 obey physics, the others have no rank.
-Equal results share a rank. η is J50 over the robot's own ankle limit. Chatter is how much torques
-change, over the motors' limits. Columns of levels of [realism](realism.md) have the recovered rate
-of the same pushes.
-
-"""
-
-
-HUMANOID: Final = "humanoid"  # whose page names no robot
 COLUMNS = {"recovered of the mix", *IN_PAIRS, *(each.heading for each in (
     J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, ROOT, TICK))}  # fmt: skip
 SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
+(ETA,) = (each for each in AIMED if each.key == "eta")
 
 
 def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = None) -> Path:
@@ -87,6 +73,29 @@ def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = N
     return page
 
 
+def leaderboard(summaries: Mapping[str, Summary]) -> str:
+    """The page as Markdown; `summaries` by where they come from."""
+    summary, origin = merged(summaries)
+    (_, first), *later = summaries.items()
+    limit = dict(summary["robot"]["ankle_limit"])
+    angles = [d["direction"] for d in summary["controllers"][summary["reference"]]["directions"]]
+    directions = direction_table(summary["controllers"], summary["ranking"], ETA)
+    if all(angle in limit for angle in angles):
+        directions[1].insert(0, ["η = 1 at [N·s]", *(f"{limit[angle]:.1f}" for angle in angles)])
+    return page_of(
+        "leaderboard.md.j2",
+        source=" ".join(summaries),
+        first=first,
+        robot=first["robot"]["name"],
+        later=[(other, [name for name in summary["ranking"] if origin[name] == source])
+               for source, other in later],
+        ranking=_ranking(summary),
+        seeds=seed_lines(summary["seeds"]),
+        directions=directions,
+        factors=_factors(summary),
+    )  # fmt: skip
+
+
 def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     """The first result with the rows of later ones; and whose result each row is.
 
@@ -94,14 +103,19 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     stays that of the first.
     """
     (first, summary), *later = summaries.items()
+    sampled = [{angle for angle, _ in each["robot"]["ankle_limit"]} for each in summaries.values()]
+    common = set.intersection(*sampled)  # [deg]: later results have the limit's corners, too
+
+    def shared(of: Summary) -> dict[str, object]:
+        limit = [row for row in of["robot"]["ankle_limit"] if row[0] in common]
+        alike = {**of, "robot": {**of["robot"], "ankle_limit": limit}}
+        return {key: alike[key] for key in SAME}
+
+    check_alike(summaries, shared)
     reference = summary["reference"]
     entries, origin = dict(summary["controllers"]), dict.fromkeys(summary["controllers"], first)
     pairs = {pair["b"]: pair for pair in summary["pairs"] if pair["a"] == reference}
     for source, other in later:
-        both = _sampled(summary) & _sampled(other)
-        for key, own, theirs in zip(SAME, _same(summary, both), _same(other, both), strict=True):
-            if own != theirs:
-                raise ConfigError(f"is not that of {first}", source=source, field=key)
         for name in other["controllers"]:
             if name != reference:
                 entries[name], origin[name] = other["controllers"][name], source
@@ -119,119 +133,51 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     return whole, origin
 
 
-def _sampled(summary: Summary) -> set[float]:
-    """Directions in which the ankle limit is told [deg]; later results have its corners, too."""
-    return {direction for direction, _ in summary["robot"]["ankle_limit"]}
+def _shape(entry: Entry) -> tuple[list[float], list[int]]:
+    """A controller's directions, and the number of levels of each factor."""
+    angles = [direction["direction"] for direction in entry["directions"]]
+    return angles, [len(factor["levels"]) for factor in entry.get("factors", ())]
 
 
-def _same(summary: Summary, directions: set[float]) -> tuple[object, ...]:
-    """What results of one page have in common; of the ankle limit that in these directions."""
-    limit = [row for row in summary["robot"]["ankle_limit"] if row[0] in directions]
-    alike = {**summary, "robot": {**summary["robot"], "ankle_limit": limit}}
-    return tuple(alike[key] for key in SAME)
-
-
-def _shape(entry: Entry) -> tuple[int, list[int]]:
-    """The number of a controller's directions, and of levels of each factor."""
-    return len(entry["directions"]), [len(f["levels"]) for f in entry.get("factors", ())]
-
-
-def leaderboard(summaries: Mapping[str, Summary]) -> str:
-    """The page as Markdown; `summaries` by where they come from."""
-    summary, origin = merged(summaries)
-    versions, machine = summary["versions"], summary["machine"]
-    text = HEAD.format(
-        of="" if summary["robot"]["name"] == HUMANOID else f": {code(summary['robot']['name'])}",
-        paired=plain(summary["rated"] or "pushes that both met"),
-        source=plain(" ".join(summaries)),
-        suite=code(summary["suite"]),
-        robot=code(summary["robot"]["name"]),
-        seed=summary["seed"],
-        poise=plain(versions.get("poise")),
-        mujoco=plain(versions.get("mujoco")),
-        commit=code((summary["commit"] or "unknown")[:10]),
-        processor=plain(machine["processor"]),
-        cores=machine["cores"],
-        reference=code(summary["reference"]),
-    )
-    for source, other in list(summaries.items())[1:]:
-        names = ", ".join(code(name) for name in summary["ranking"] if origin[name] == source)
-        text += f"Played later, commit {code((other['commit'] or 'unknown')[:10])}, "
-        text += f"{plain(other['machine']['processor'])}, {other['machine']['cores']} cores: "
-        text += f"{names}.\n\n"
-    text += markdown_table(*_ranked(summary))
-    if lines := seed_lines(summary["seeds"]):
-        text += "\n" + "\n".join(f"- {line}" for line in lines) + "\n"
-    text += "\nη per direction (0° is forward, 90° left):\n\n"
-    text += markdown_table(*_directions(summary))
-    factors = _factors(summary)
-    if factors is not None:
-        text += "\nRecovered rate per level of a factor, all else standard:\n\n"
-        text += markdown_table(*factors)
-    return text
-
-
-Cells = list[list[str]]
-
-
-def _ranked(summary: Summary) -> tuple[list[str], Cells]:
-    entries = summary["controllers"]
-    columns = [
-        (heading, text)
-        for heading, text in table_columns(summary)
+def _ranking(summary: Summary) -> Table:
+    entries, names = summary["controllers"], summary["ranking"]
+    cells = {
+        heading: texts
+        for heading, texts in table_cells(summary).items()
         if heading in COLUMNS and (summary["rated"] or heading != RECOVERED.heading)
-    ]  # else each of its own pushes
-    columns += [(CHATTER.heading, lambda name: CHATTER.text(entries[name])), *_levels(summary)]
-    columns.insert(1, (J50_PER_MASS.unit, lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
+    }  # else each of its own pushes
+    per_mass = [f"{entries[name]['j50_mean_per_mass']:.2f}" for name in names]
+    cells = {J50_MEAN.heading: cells.pop(J50_MEAN.heading), J50_PER_MASS.unit: per_mass, **cells}
+    cells[CHATTER.heading] = [CHATTER.text(entries[name]) for name in names]
+    at_levels = [dict(_realism(entries[name])) for name in names]
+    cells |= {level: [own.get(level, NONE) for own in at_levels] for level in at_levels[0]}
     rank = places(entries)
-    rows = [[str(rank[name] or NONE), code(name), *(text(name) for _, text in columns)]
-            for name in summary["ranking"]]  # fmt: skip
-    return ["", "controller", *(heading for heading, _ in columns)], rows
-
-
-def _levels(summary: Summary) -> Iterator[tuple[str, Callable[[str], str]]]:
-    """Columns for each level of realism, the suite's own first: what was recovered of the same
-    pushes, and J50 there."""
-    entries = summary["controllers"]
-    for k, factor in enumerate(entries[summary["ranking"][0]].get("factors", ())):
-        levels = enumerate(factor["levels"] if factor["factor"] == "realism" else ())
-        for i, level in sorted(levels, key=lambda each: not each[1]["standard"]):
-
-            def rate(name: str, k: int = k, i: int = i) -> str:
-                return f"{entries[name]['factors'][k]['levels'][i]['recovered_rate']:.0%}"
-
-            yield code(level["level"]), rate
-    others = entries[summary["ranking"][0]].get("levels", [])[1:]
-    for i, other in enumerate(others, 1):
-        for figure in known([J50_MEAN, J50_KEPT], [other]):
-
-            def text(name: str, i: int = i, figure: Figure = figure) -> str:
-                levels = entries[name].get("levels", [])  # of another result there may be none
-                return figure.text(levels[i]) if i < len(levels) else NONE
-
-            yield f"{figure.name}, {code(other['level'])}", text
-
-
-def _directions(summary: Summary) -> tuple[list[str], Cells]:
-    entries = summary["controllers"]
-    angles = [d["direction"] for d in entries[summary["ranking"][0]]["directions"]]
     rows = [
-        [code(name), *(f"{d['eta']:.2f}" for d in entries[name]["directions"])]
-        for name in summary["ranking"]
+        [str(rank[name] or NONE), code(name), *texts]
+        for name, texts in zip(names, zip(*cells.values(), strict=True), strict=True)
     ]
-    limit = {angle: impulse for angle, impulse in summary["robot"]["ankle_limit"]}
-    if all(angle in limit for angle in angles):
-        rows.insert(0, ["η = 1 at [N·s]", *(f"{limit[angle]:.1f}" for angle in angles)])
-    return ["controller", *(f"{angle:g}°" for angle in angles)], rows
+    return ["", "controller", *cells], rows
 
 
-def _factors(summary: Summary) -> tuple[list[str], Cells] | None:
-    names, entries = summary["ranking"], summary["controllers"]
+def _realism(entry: Entry) -> Iterator[tuple[str, str]]:
+    """Heading and cell of each level of realism, the suite's own first: what was recovered of the
+    same pushes, and J50 there."""
+    for factor in entry.get("factors", ()):
+        levels = factor["levels"] if factor["factor"] == "realism" else []
+        for level in sorted(levels, key=lambda each: not each["standard"]):
+            yield code(level["level"]), f"{level['recovered_rate']:.0%}"
+    for other in entry.get("levels", [])[1:]:
+        for figure in known([J50_MEAN, J50_KEPT], [other]):
+            yield f"{figure.name}, {code(other['level'])}", figure.text(other)
+
+
+def _factors(summary: Summary) -> Table:
+    names = summary["ranking"]
+    found = [summary["controllers"][name].get("factors", []) for name in names]
     rows = []
-    for k, factor in enumerate(entries[names[0]].get("factors", ())):
-        for i, level in enumerate(factor["levels"]):
-            here = [entries[name]["factors"][k]["levels"][i] for name in names]
-            mark = " (standard)" if level["standard"] else ""
-            rates = (f"{cell['recovered_rate']:.0%}" for cell in here)
-            rows.append([plain(factor["factor"]), f"{plain(level['level'])}{mark}", *rates])
-    return (["factor", "level", *(code(name) for name in names)], rows) if rows else None
+    for factors in zip(*found, strict=True):
+        for levels in zip(*(factor["levels"] for factor in factors), strict=True):
+            mark = " (standard)" if levels[0]["standard"] else ""
+            rates = (f"{level['recovered_rate']:.0%}" for level in levels)
+            rows.append([plain(factors[0]["factor"]), plain(levels[0]["level"]) + mark, *rates])
+    return ["factor", "level", *(code(name) for name in names)], rows

@@ -24,31 +24,21 @@ FLAGS = {"True": True, "False": False}
 
 @dataclass(frozen=True)
 class Record:
-    """A controller in a trial: a line of trials.csv.
-
-    Attributes:
-        trial, controller: which.
-        recovered, fallen: whether.
-        impulse [N·s], direction [deg], duration [s]: of the first push; NaN without one.
-        fraction: impulse over the limit of the suite; NaN where it has none.
-        fall_time: [s] after the reset; NaN without a fall.
-        start: of the first push [s]; None without one.
-        why: why it was lost, in words; empty of a trial that was recovered, and of older results.
-        line: all columns of trials.csv, as they are written there.
-    """
+    """A controller in a trial: a line of trials.csv."""
 
     trial: int
     controller: str
     recovered: bool
     fallen: bool
-    impulse: float
-    direction: float
-    duration: float
-    fraction: float
-    fall_time: float
-    start: float | None
+    impulse: float  #: of the first push [N·s]; NaN without one, as the next two
+    direction: float  #: [deg]
+    duration: float  #: [s]
+    fraction: float  #: impulse over the limit of the suite; NaN where it has none
+    fall_time: float  #: [s] after the reset; NaN without a fall
+    start: float | None  #: of the first push [s]; None without one
+    #: why it was lost, in words; empty of a trial that was recovered, and of older results
     why: str
-    line: Mapping[str, str]
+    line: Mapping[str, str]  #: all columns of trials.csv, as they are written there
 
     @property
     def part(self) -> str:
@@ -68,19 +58,12 @@ class Record:
 
 @dataclass(frozen=True)
 class Results:
-    """The content of a result's folder.
+    """The content of a result's folder."""
 
-    Attributes:
-        folder: where it was read.
-        settings: everything that decides the result.
-        summary: summary.json.
-        records: of every trial and controller, as in trials.csv.
-    """
-
-    folder: Path
-    settings: Settings
-    summary: Summary
-    records: tuple[Record, ...]
+    folder: Path  #: where it was read
+    settings: Settings  #: everything that decides the result
+    summary: Summary  #: summary.json
+    records: tuple[Record, ...]  #: of every trial and controller, as in trials.csv
 
     @property
     def reference(self) -> str:

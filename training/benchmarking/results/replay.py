@@ -1,7 +1,7 @@
 """Playing one trial of a result again, exactly, from its folder, and filming it."""
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,18 +29,12 @@ NARROW = (480, 480)  # [pixels] of one of several
 
 @dataclass(frozen=True)
 class Replay:
-    """A trial played again.
-
-    Attributes:
-        trial: the trial.
-        controller: who played it.
-        outcome: of now.
-        differences: column of trials.csv → (recorded, now), for those that differ.
-    """
+    """A trial played again."""
 
     trial: Trial
-    controller: str
-    outcome: Outcome
+    controller: str  #: who played it
+    outcome: Outcome  #: of now
+    #: column of trials.csv → (recorded, now), for those that differ
     differences: dict[str, tuple[str, str]]
 
 
@@ -70,9 +64,7 @@ def replay(
             robot that is no longer the one that took part, or may not run.
         PoiseError: nothing can be drawn here, or a file cannot be written.
     """
-    path = folder.folder if isinstance(folder, Results) else Path(folder)
-    with allowing(allow, source=path / SETTINGS):
-        results = folder if isinstance(folder, Results) else load_results(path)
+    with _opened(folder, allow) as results:
         name = results.controllers[-1] if controller is None else controller
         record = results.record(name, trial)
         again = results.trial(record)
@@ -106,41 +98,42 @@ def film(
     controllers: Sequence[str],
     path: str | Path,
     *,
-    fps: float | None = None,
-    size: tuple[int, int] | None = None,
     allow: str | Iterable[str] = (),
 ) -> None:
     """Play a trial of a result again with some controllers and film them side by side.
 
-    The camera stands beside the first push (`beside`).
+    The camera stands beside the first push (`beside`). Size and rate are those of `record`, but
+    `NARROW` of several that are no WebP.
 
     Args:
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
         trial: its number in trials.csv; all of `controllers` have played it.
         controllers: names, from left to right.
         path: of the video, ending in .mp4 or .webp.
-        fps: frames a second that are wanted [1/s]; None: as of `record`.
-        size: width and height of each picture [pixels]; None: as of `record`, but `NARROW` of
-            several that are no WebP.
         allow: controllers from outside (``module:Class``) that may run.
 
     Raises:
-        ConfigError: as `replay`, and for a path or size that is not valid.
+        ConfigError: as `replay`, and for a path that is not valid.
         PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
     """
-    where = folder.folder if isinstance(folder, Results) else Path(folder)
-    usual_size, usual_rate = usual(path)
-    if len(controllers) > 1 and usual_size == SIZE:
-        usual_size = NARROW
-    size, fps = size or usual_size, fps or usual_rate
-    with allowing(allow, source=where / SETTINGS), ExitStack() as stack:
-        results = folder if isinstance(folder, Results) else load_results(where)
+    size, rate = usual(path)
+    if len(controllers) > 1 and size == SIZE:
+        size = NARROW
+    with _opened(folder, allow) as results, ExitStack() as stack:
         episodes = {}
         for name in controllers:
             again = results.trial(results.record(name, trial))
             episode = _episode(results, name, again, size)
             episodes[name] = stack.enter_context(episode)
-        record_together(episodes, path, fps=fps)
+        record_together(episodes, path, fps=rate)
+
+
+@contextmanager
+def _opened(folder: str | Path | Results, allow: str | Iterable[str]) -> Iterator[Results]:
+    """What a folder holds; meanwhile the controllers from outside may run that are allowed."""
+    path = folder.folder if isinstance(folder, Results) else Path(folder)
+    with allowing(allow, source=path / SETTINGS):
+        yield folder if isinstance(folder, Results) else load_results(path)
 
 
 def _episode(results: Results, name: str, trial: Trial, size: tuple[int, int]) -> Episode:

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from poise.configs.errors import ConfigError
-from poise.configs.texts import code, markdown_table, plain
-from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text
+from poise.configs.texts import code, plain
+from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text, places
 from poise.training.benchmarking.statistics.rates import poisson_interval
 from poise.training.running.columns import (
     COSTS,
@@ -19,19 +19,9 @@ from poise.training.running.columns import (
 )
 from poise.training.running.summary import Entry, Summary, WalkLevel
 
-HEAD = """# Leaderboard of walks
+from .pages import Table, check_alike, direction_table, page_of
 
-<!-- Written by `poise leaderboard {source}`: change the results, not this page. -->
-
-Suite {suite}, robot {robot}, seed {seed}; Poise {poise}, MuJoCo {mujoco}. Intervals are 95 %;
-what the columns mean: [walking.md](walking.md#figures). Falls a minute are of walks without a push.
-A controller that took a force from nowhere has no rank.
-
-{j50}
-
-"""
 UNPUSHED, PUSHED = "walk", "walk_push"
-Cells = list[list[str]]
 
 
 def is_of_walks(summary: Summary) -> bool:
@@ -46,48 +36,34 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
     of the mean J50 [N·s], those without one last. Raises ConfigError for results of another suite,
     seed or robot than the first, and for a controller without walks of the first one's commands.
     """
-    (first, summary), *later = summaries.items()
+    check_alike(summaries, lambda of: {
+        "suite": of["suite"], "seed": of["seed"],
+        "robot.name": of["robot"]["name"], "robot.mass": of["robot"]["mass"],
+    })  # fmt: skip
+    first, *_ = summaries
     entries: dict[str, Entry] = {}
     origin: dict[str, str] = {}
-    for source, other in [(first, summary), *later]:
-        _expect_alike(summary, other, first, source)
-        entries |= other["controllers"]
-        origin |= dict.fromkeys(other["controllers"], source)
+    for source, summary in summaries.items():
+        entries |= summary["controllers"]
+        origin |= dict.fromkeys(summary["controllers"], source)
     commands = [level["level"] for level in _levels(next(iter(entries.values())), UNPUSHED)]
     for name, entry in entries.items():
         if not commands or [each["level"] for each in _levels(entry, UNPUSHED)] != commands:
             raise ConfigError(f"has no walks of the commands of {first}", source=origin[name],
                               field=f"controllers.{name}")  # fmt: skip
     names = sorted(entries, key=lambda name: _order(entries[name]))
-    versions = summary["versions"]
-    text = HEAD.format(
-        source=plain(" ".join(summaries)),
-        suite=code(summary["suite"]),
-        robot=code(summary["robot"]["name"]),
-        seed=summary["seed"],
-        poise=plain(versions.get("poise")),
-        mujoco=plain(versions.get("mujoco")),
+    return page_of(
+        "walks.md.j2",
+        source=" ".join(summaries),
+        first=summaries[first],
         j50=_pushed(entries),
-    )
-    text += markdown_table(*_ranking(entries, names))
-    for command in commands:
-        text += f"\nCommand {command}:\n\n" + markdown_table(*_walks(entries, names, command))
-    directions = _directions(entries, names)
-    if directions is not None:
-        text += f"\n{J50.heading} per direction (0° is forward, 90° left):\n\n"
-        text += markdown_table(*directions)
-    return text + "\n" + "".join(_played(each, summaries[each], origin) for each in summaries)
-
-
-def _expect_alike(summary: Summary, other: Summary, first: str, source: str) -> None:
-    for key, own, theirs in (
-        ("suite", summary["suite"], other["suite"]),
-        ("seed", summary["seed"], other["seed"]),
-        ("robot.name", summary["robot"]["name"], other["robot"]["name"]),
-        ("robot.mass", summary["robot"]["mass"], other["robot"]["mass"]),
-    ):
-        if own != theirs:
-            raise ConfigError(f"is not that of {first}", source=source, field=key)
+        ranking=_ranking(entries, names),
+        commands={command: _walks(entries, names, command) for command in commands},
+        heading=J50.heading,
+        directions=direction_table(entries, names, OF_DIRECTION),
+        played=[(summary, [name for name in summary["controllers"] if origin[name] == source])
+                for source, summary in summaries.items()],
+    )  # fmt: skip
 
 
 def _pushed(entries: Mapping[str, Entry]) -> str:
@@ -116,24 +92,19 @@ def _order(entry: Entry) -> tuple[bool, bool, float]:
     return assisted(entry), j50 is None, -(j50 or 0.0)
 
 
-def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> tuple[list[str], Cells]:
+def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
     head = ["", "controller", J50_MEAN.heading, J50_PER_MASS.unit, "worst direction",
             "pushes recovered", "fell unpushed", "falls a minute", "as told, unpushed"]  # fmt: skip
-    shown = {name: format(entries[name]["j50_mean"], ".1f") for name in names
-             if "j50_mean" in entries[name] and not assisted(entries[name])}  # fmt: skip
-    rows = []
+    rank, rows = places(entries, ("j50_mean", ".1f")), []
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
         fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)
         told, minutes = sum(w["recovered"] for w in walks), sum(w["minutes"] for w in walks)
         low, high = poisson_interval(fallen)
-        rank = NONE
-        if name in shown:
-            rank = str(1 + sum(float(other) > float(shown[name]) for other in shown.values()))
         rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
                 if minutes else NONE)  # fmt: skip
-        rows.append([rank, code(name), *_j50(entry), _pushes(entry), f"{fallen} of {trials}",
-                     rate, f"{told} of {trials}"])  # fmt: skip
+        rows.append([str(rank[name] or NONE), code(name), *_j50(entry), _pushes(entry),
+                     f"{fallen} of {trials}", rate, f"{told} of {trials}"])  # fmt: skip
     return head, rows
 
 
@@ -161,33 +132,9 @@ WALKS = (FALLS[1], FOLLOWED[0], FOLLOWED[3], replace(STEPS[2], form=".2f"),
 OF_DIRECTION = replace(J50, bound="")
 
 
-def _walks(
-    entries: Mapping[str, Entry], names: Sequence[str], command: str
-) -> tuple[list[str], Cells]:
+def _walks(entries: Mapping[str, Entry], names: Sequence[str], command: str) -> Table:
     rows = []
     for name in names:
         (level,) = (w for w in _levels(entries[name], UNPUSHED) if w["level"] == command)
         rows.append([code(name), *(each.text(level) for each in WALKS)])
     return ["controller", *(each.heading for each in WALKS)], rows
-
-
-def _directions(
-    entries: Mapping[str, Entry], names: Sequence[str]
-) -> tuple[list[str], Cells] | None:
-    found = {name: {d["direction"]: d for d in entries[name].get("directions", ())}
-             for name in names}  # fmt: skip
-    angles = sorted({angle for each in found.values() for angle in each})
-    rows = [
-        [code(name), *(OF_DIRECTION.text(each[a]) if a in each else NONE for a in angles)]
-        for name, each in found.items() if each
-    ]  # fmt: skip
-    return (["controller", *(f"{angle:g}°" for angle in angles)], rows) if rows else None
-
-
-def _played(source: str, summary: Summary, origin: Mapping[str, str]) -> str:
-    names = ", ".join(code(name) for name in summary["controllers"] if origin[name] == source)
-    if not names:
-        return ""
-    machine = summary["machine"]
-    return (f"- {names}: commit {code((summary['commit'] or 'unknown')[:10])}, "
-            f"{plain(machine['processor'])}, {machine['cores']} cores.\n")  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .fits import LogisticFit, check_trials, fit_logistic, solve_weighted
-from .rates import Interval, check_confidence, percentile_interval
+from .rates import Interval, percentile_interval
 
 PARAMETERS = 2  # of one logistic fit
 
@@ -42,17 +42,10 @@ class EnvelopeFit:
 
 @dataclass(frozen=True)
 class Gain:
-    """J50 of a candidate over a reference: difference and ratio minus one.
+    """J50 of a candidate over that of a reference, minus one; NaN where the latter is zero."""
 
-    `bounded` counts the J50s behind it that are only bounds. The relative gain is NaN where the
-    J50 of the reference is zero.
-    """
-
-    absolute: float
-    absolute_ci: Interval
     relative: float
     relative_ci: Interval
-    bounded: int
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,6 @@ def mean_over_directions(
     recovered: ArrayLike,
     *,
     resamples: int = 1000,
-    confidence: float = 0.95,
     seed: int = 0,
 ) -> EnvelopeFit:
     """Fit every direction, and the mean of their J50 with a stratified bootstrap interval.
@@ -85,9 +77,8 @@ def mean_over_directions(
         impulse, recovered: (n,) trials, as for `fit_logistic`.
 
     Raises:
-        ValueError: as `fit_logistic`, confidence outside (0, 1), or a direction that is not finite.
+        ValueError: as `fit_logistic`, or a direction that is not finite.
     """
-    check_confidence(confidence)
     impulse, recovered = check_trials(impulse, recovered)
     directions, rows = _strata(direction, impulse.size)
     seeds = np.random.SeedSequence(seed).spawn(len(rows))
@@ -96,7 +87,7 @@ def mean_over_directions(
         weights, freedom = _resample(i.size, resamples, s), (i.size, PARAMETERS)
         fit = fit_logistic(impulse[i], recovered[i])
         drawn = solve_weighted(impulse[i], recovered[i], weights)[:2]
-        intervals = (percentile_interval(each, confidence, freedom=freedom) for each in drawn)
+        intervals = (percentile_interval(each, freedom) for each in drawn)
         fits.append(DirectionFit(fit, *intervals))
         replicates.append(drawn[0])
     return EnvelopeFit(
@@ -104,9 +95,7 @@ def mean_over_directions(
         fits=tuple(fits),
         j50_mean=float(np.mean([f.fit.j50 for f in fits])),
         j50_mean_ci=percentile_interval(
-            np.mean(replicates, axis=0),
-            confidence,
-            freedom=(impulse.size, PARAMETERS * len(rows)),
+            np.mean(replicates, axis=0), (impulse.size, PARAMETERS * len(rows))
         ),
         bounded=sum(f.fit.bound is not None for f in fits),
     )
@@ -119,12 +108,11 @@ def j50_gain(
     recovered_candidate: ArrayLike,
     *,
     resamples: int = 1000,
-    confidence: float = 0.95,
     seed: int = 0,
 ) -> EnvelopeGain:
     """Paired gain in J50 of a candidate over a reference that met the same trials.
 
-        absolute = J50_candidate − J50_reference,   relative = absolute / J50_reference
+        (J50_candidate − J50_reference) / J50_reference
 
     per direction, and for the mean J50 over directions (the ratio of the means, not the mean of the
     ratios). Each bootstrap replicate draws the same trials for both.
@@ -136,55 +124,32 @@ def j50_gain(
     Raises:
         ValueError: as `mean_over_directions`.
     """
-    check_confidence(confidence)
     impulse, reference = check_trials(impulse, recovered_reference)
     impulse, candidate = check_trials(impulse, recovered_candidate)
     directions, rows = _strata(direction, impulse.size)
     seeds = np.random.SeedSequence(seed).spawn(len(rows))
-
     gains, j50s, replicates = [], [], []
     for i, s in zip(rows, seeds, strict=True):
-        weights = _resample(i.size, resamples, s)
-        fits = [fit_logistic(impulse[i], outcome[i]) for outcome in (reference, candidate)]
-        j50 = np.array([f.j50 for f in fits])
-        drawn = np.array(
-            [solve_weighted(impulse[i], out[i], weights)[0] for out in (reference, candidate)]
-        )
-        bounded = sum(f.bound is not None for f in fits)
-        gains.append(_gain(j50, drawn, confidence, (i.size, PARAMETERS), bounded))
-        j50s.append(j50)
-        replicates.append(drawn)
+        weights, outcomes = _resample(i.size, resamples, s), (reference[i], candidate[i])
+        j50s.append([fit_logistic(impulse[i], outcome).j50 for outcome in outcomes])
+        replicates.append([solve_weighted(impulse[i], each, weights)[0] for each in outcomes])
+        gains.append(_gain(j50s[-1], replicates[-1], (i.size, PARAMETERS)))
     mean = _gain(
         np.mean(j50s, axis=0),
         np.mean(replicates, axis=0),
-        confidence,
         (impulse.size, PARAMETERS * len(rows)),
-        sum(gain.bounded for gain in gains),
     )
     return EnvelopeGain(mean, directions, tuple(gains))
 
 
-def _gain(
-    j50: np.ndarray,
-    replicates: np.ndarray,
-    confidence: float,
-    freedom: tuple[int, int],
-    bounded: int,
-) -> Gain:
+def _gain(j50: ArrayLike, replicates: ArrayLike, freedom: tuple[int, int]) -> Gain:
     """Gain from J50 of reference and candidate, (2,), and their replicates, (2, resamples)."""
 
-    def relative(pair: np.ndarray) -> np.ndarray:
-        return np.divide(
-            pair[1] - pair[0], pair[0], out=np.full_like(pair[0], np.nan), where=pair[0] > 0
-        )
+    def relative(pair: ArrayLike) -> np.ndarray:
+        one, two = np.asarray(pair)
+        return np.divide(two - one, one, out=np.full_like(one, np.nan), where=one > 0)
 
-    return Gain(
-        absolute=float(j50[1] - j50[0]),
-        absolute_ci=percentile_interval(replicates[1] - replicates[0], confidence, freedom=freedom),
-        relative=float(relative(j50[:, None])[0]),
-        relative_ci=percentile_interval(relative(replicates), confidence, freedom=freedom),
-        bounded=bounded,
-    )
+    return Gain(float(relative(j50)), percentile_interval(relative(replicates), freedom))
 
 
 def _resample(trials: int, resamples: int, seed: np.random.SeedSequence) -> np.ndarray:

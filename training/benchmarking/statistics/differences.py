@@ -1,4 +1,4 @@
-"""Differences of two estimates, with intervals made of the intervals of the two."""
+"""Differences and ratios of two estimates, with intervals made of the intervals of the two."""
 
 from collections.abc import Sequence
 
@@ -7,6 +7,7 @@ import numpy as np
 from .rates import Interval, wilson_interval
 
 Range = Sequence[float]  # (low, high)
+Open = Sequence[float | None] | None  # the same, of which an end may not be known
 
 
 def difference(
@@ -34,14 +35,26 @@ def difference(
 
 
 def relative_gain(
-    a: float, a_ci: Range, b: float, b_ci: Range
+    a: float, a_ci: Open, b: float, b_ci: Open
 ) -> tuple[float, Interval] | tuple[None, None]:
-    """b/a − 1 and its interval, from the difference of the logarithms; None if any is not > 0."""
-    if min(a, b, *a_ci, *b_ci) <= 0.0:
+    """b/a − 1 and its interval, from the difference of the logarithms [Zou08].
+
+    None where an end of an interval is not known, or anything is not > 0.
+    """
+    known = [end for end in (*(a_ci or ()), *(b_ci or ())) if end is not None]
+    if len(known) < 4 or min(a, b, *known) <= 0.0:
         return None, None
-    logs_a, logs_b = np.log(a_ci).tolist(), np.log(b_ci).tolist()
-    gap, ends = difference(float(np.log(a)), logs_a, float(np.log(b)), logs_b)
+    logs = np.log(known).tolist()
+    gap, ends = difference(float(np.log(a)), logs[:2], float(np.log(b)), logs[2:])
     return float(np.expm1(gap)), Interval(float(np.expm1(ends[0])), float(np.expm1(ends[1])))
+
+
+def ratio(a: float, a_ci: Open, b: float, b_ci: Open) -> tuple[float, Interval] | tuple[None, None]:
+    """b/a and its interval, or None, as `relative_gain`."""
+    gain, ends = relative_gain(a, a_ci, b, b_ci)
+    if gain is None or ends is None:
+        return None, None
+    return 1.0 + gain, Interval(1.0 + ends.low, 1.0 + ends.high)
 
 
 def paired_rates(both: int, only_a: int, only_b: int, neither: int) -> tuple[float, Interval]:

@@ -37,17 +37,11 @@ HUMAN_COM_HEIGHT = _human_com_height()
 
 @dataclass(frozen=True)
 class Size:
-    """The sizes of a robot that the normalisation needs.
+    """The sizes of a robot that the normalisation needs."""
 
-    Attributes:
-        mass: [kg].
-        com_height: of the standing posture [m].
-        reach: half the base of support in the direction of the push [m].
-    """
-
-    mass: float
-    com_height: float
-    reach: float
+    mass: float  #: [kg]
+    com_height: float  #: of the standing posture [m]
+    reach: float  #: half the base of support in the direction of the push [m]
 
 
 def sway_angle(com: ArrayLike, ankles: ArrayLike, direction: ArrayLike) -> np.ndarray:

@@ -23,25 +23,17 @@ Bound = Literal["lower", "upper"]
 
 @dataclass(frozen=True)
 class LogisticFit:
-    """Falling logistic curve P(recover | J) = 1 / (1 + exp((J − J50) / s)).
+    """Falling logistic curve P(recover | J) = 1 / (1 + exp((J − J50) / s))."""
 
-    Attributes:
-        j50: impulse recovered with 50 % probability, in the unit of the trials.
-        j90: impulse recovered with 90 % probability, J50 − s ln 9: smaller than j50.
-        scale: s > 0, in the unit of the trials.
-        bound: None, or what the data leave open. "lower": all trials were recovered, or the curve
-            passes one half beyond the largest impulse tried, so that j50 is that largest impulse
-            and the true J50 is at least about this. "upper": the same at the smallest impulse.
-        trials: number of trials.
-        recovered: number of recovered trials.
-    """
-
-    j50: float
-    j90: float
-    scale: float
+    j50: float  #: impulse recovered with 50 % probability, in the unit of the trials
+    j90: float  #: the same with 90 %, J50 − s ln 9: smaller than j50
+    scale: float  #: s > 0, in the unit of the trials
+    #: None, or what the data leave open. "lower": all trials were recovered, or the curve passes
+    #: one half beyond the largest impulse tried, so that j50 is that largest impulse and the true
+    #: J50 is at least about this. "upper": the same at the smallest impulse
     bound: Bound | None
-    trials: int
-    recovered: int
+    trials: int  #: their number
+    recovered: int  #: how many of them were recovered
 
     def probability(self, impulse: ArrayLike) -> np.ndarray:
         """P(recover | J) at the given impulses, same shape. Of no use where `bound` is set."""

@@ -5,39 +5,20 @@ random numbers draws them from a seed, so that the same trials give the same fig
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, TypedDict
 
 import numpy as np
 import scipy  # loads its parts when they are first asked for
 from numpy.typing import ArrayLike
 
+CONFIDENCE = 0.95  # of every interval
+
 
 class Interval(NamedTuple):
-    """A confidence interval; a tuple, so that JSON writes it as [low, high]."""
+    """A 95 % confidence interval; a tuple, so that JSON writes it as [low, high]."""
 
     low: float
     high: float
-
-
-@dataclass(frozen=True)
-class McNemar:
-    """Outcome of McNemar's test on paired trials."""
-
-    only_a: int
-    only_b: int
-    p_value: float
-    method: str
-
-
-@dataclass(frozen=True)
-class SeedAggregate:
-    """Interquartile mean over training seeds and tasks, with its bootstrap interval."""
-
-    iqm: float
-    interval: Interval
-    seeds: int
-    tasks: int
 
 
 class SeedFigures(TypedDict):
@@ -51,25 +32,24 @@ class SeedFigures(TypedDict):
     worst_seed: int
 
 
-def poisson_interval(count: int, confidence: float = 0.95) -> Interval:
+def poisson_interval(count: int) -> Interval:
     """Garwood's exact interval of the mean of a Poisson distribution that gave `count`.
 
-        (χ²_{α/2}(2 count) / 2, χ²_{1−α/2}(2 count + 2) / 2),   α = 1 − confidence
+        (χ²_{α/2}(2 count) / 2, χ²_{1−α/2}(2 count + 2) / 2),   α = 0.05
 
     Divided by the time in which so many were counted, it is that of their rate.
 
     Raises:
-        ValueError: a negative count, or confidence outside (0, 1).
+        ValueError: a negative count.
     """
     if count < 0:
         raise ValueError(f"count must not be negative, got {count}")
-    check_confidence(confidence)
-    tail = 0.5 * (1.0 - confidence)
+    tail = 0.5 * (1.0 - CONFIDENCE)
     low = 0.0 if count == 0 else 0.5 * float(scipy.stats.chi2.ppf(tail, 2 * count))
     return Interval(low, 0.5 * float(scipy.stats.chi2.ppf(1.0 - tail, 2 * count + 2)))
 
 
-def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> Interval:
+def wilson_interval(successes: int, trials: int) -> Interval:
     """Wilson score interval of a proportion.
 
         (p̂ + z²/2n ± z √(p̂(1 − p̂)/n + z²/4n²)) / (1 + z²/n),   p̂ = successes / trials
@@ -78,14 +58,13 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> In
     gives (0, 1).
 
     Raises:
-        ValueError: not 0 <= successes <= trials, or confidence outside (0, 1).
+        ValueError: not 0 <= successes <= trials.
     """
     if not 0 <= successes <= trials:
         raise ValueError(f"successes must be within [0, trials], got {successes} of {trials}")
-    check_confidence(confidence)
     if trials == 0:
         return Interval(0.0, 1.0)
-    z = float(scipy.stats.norm.ppf(0.5 + confidence / 2))
+    z = float(scipy.stats.norm.ppf(0.5 + CONFIDENCE / 2))
     rate = successes / trials
     shrink = 1 + z**2 / trials
     centre = (rate + z**2 / (2 * trials)) / shrink
@@ -96,8 +75,8 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> In
     return Interval(low, high)
 
 
-def mcnemar(only_a: int, only_b: int) -> McNemar:
-    """McNemar's test: do two controllers recover equally often on the same trials?
+def mcnemar(only_a: int, only_b: int) -> float:
+    """The p-value of McNemar's test: do two controllers recover equally often on the same trials?
 
     Only the trials count on which they differ: `only_a` recovered by a alone, `only_b` by b alone.
     If both are equally good, only_a is Binomial(only_a + only_b, ½). The p-value is the exact
@@ -110,7 +89,7 @@ def mcnemar(only_a: int, only_b: int) -> McNemar:
     if only_a < 0 or only_b < 0:
         raise ValueError(f"counts must not be negative, got {only_a} and {only_b}")
     tail = float(scipy.stats.binom.cdf(min(only_a, only_b), only_a + only_b, 0.5))
-    return McNemar(int(only_a), int(only_b), min(1.0, 2 * tail), "exact binomial, two-sided")
+    return min(1.0, 2 * tail)
 
 
 def iqm(scores: ArrayLike) -> float:
@@ -125,8 +104,8 @@ def iqm(scores: ArrayLike) -> float:
 
 
 def seed_aggregate(
-    scores: ArrayLike, *, resamples: int = 2000, confidence: float = 0.95, seed: int = 0
-) -> SeedAggregate:
+    scores: ArrayLike, *, resamples: int = 2000, seed: int = 0
+) -> tuple[float, Interval]:
     """IQM of scores over training seeds, with a stratified percentile bootstrap [Agarwal21].
 
     Args:
@@ -138,7 +117,6 @@ def seed_aggregate(
     Raises:
         ValueError: no score, one that is not finite, or more than two axes.
     """
-    check_confidence(confidence)
     table = _finite(scores)
     if table.ndim > 2:
         raise ValueError(f"scores must have shape (seeds,) or (seeds, tasks), got {table.shape}")
@@ -147,26 +125,25 @@ def seed_aggregate(
     rows = np.random.default_rng(seed).integers(seeds, size=(resamples, seeds, tasks))
     drawn = np.take_along_axis(table[None], rows, axis=1)
     replicates = scipy.stats.trim_mean(drawn.reshape(resamples, -1), 0.25, axis=1)
-    return SeedAggregate(iqm(table), percentile_interval(replicates, confidence), seeds, tasks)
+    return iqm(table), percentile_interval(replicates)
 
 
 def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
     """IQM of (seeds, tasks) with its interval, every seed's mean, and the worst of these."""
-    found, values = seed_aggregate(scores), scores.mean(axis=1)
+    mean, interval = seed_aggregate(scores)
+    values = scores.mean(axis=1)
     worst = int(np.argmin(values))
     return {
-        "iqm": found.iqm,
-        "iqm_ci95": found.interval,
-        "tasks": found.tasks,
+        "iqm": mean,
+        "iqm_ci95": interval,
+        "tasks": scores.shape[1],
         "values": values.tolist(),
         "worst": float(values[worst]),
         "worst_seed": seeds[worst],
     }
 
 
-def percentile_interval(
-    replicates: np.ndarray, confidence: float = 0.95, *, freedom: tuple[int, int] | None = None
-) -> Interval:
+def percentile_interval(replicates: np.ndarray, freedom: tuple[int, int] | None = None) -> Interval:
     """Percentile bootstrap interval of replicates, shape (resamples,).
 
     Resampling n trials for an estimate with k parameters shows too little spread, by a factor of
@@ -174,7 +151,7 @@ def percentile_interval(
     the small sample, as a t interval is wider than a normal one ("expanded percentile interval",
     Hesterberg 2015): the tail is Φ(−√(n/(n − k)) t) with t of n − k degrees of freedom.
     """
-    tail = (1 - confidence) / 2
+    tail = (1 - CONFIDENCE) / 2
     if freedom is not None:
         n, k = freedom
         left = max(n - k, 1)
@@ -199,12 +176,6 @@ def eta(j50: ArrayLike, mass: float, limit: ArrayLike) -> np.ndarray:
     if not mass > 0 or not np.all(limit > 0):
         raise ValueError("mass and limit must be positive")
     return np.asarray(j50, dtype=float) / mass / limit
-
-
-def check_confidence(confidence: float) -> None:
-    """Raise ValueError unless 0 < confidence < 1."""
-    if not 0 < confidence < 1:
-        raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
 
 
 def _finite(scores: ArrayLike) -> np.ndarray:

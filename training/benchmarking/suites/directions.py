@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import ClassVar, Literal, Self
 
 from poise.envs.physics.pushes.options import to_impulse
@@ -9,7 +10,7 @@ from poise.envs.physics.pushes.sampler import Range
 from poise.training.benchmarking.statistics.fits import fit_logistic
 from poise.training.benchmarking.trials.trial import Trial
 
-from .draw import MOST_TRIALS, Draw, Part, Recovered
+from .draw import MOST_TRIALS, Draw, Part, Recovered, repeated
 
 
 @dataclass(frozen=True)
@@ -100,18 +101,18 @@ class Grid(Part):
             raise ValueError("magnitudes: must not be empty")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        trials: list[Trial] = []
-        for k in range(self.directions):
-            angle = 360.0 * k / self.directions
-            for magnitude in self.magnitudes:
-                impulse = to_impulse(
+        angles = [360.0 * k / self.directions for k in range(self.directions)]
+        pushes = [
+            draw.push(
+                angle,
+                to_impulse(
                     self.unit, magnitude, draw.robot, angle, draw.standard.push_duration, "square",
                     draw.limits.margin,
-                )  # fmt: skip
-                for _ in range(self.repeats):
-                    push = draw.push(angle, impulse)
-                    trials.append(draw.trial(number + len(trials), [push], part="grid"))
-        return trials
+                ),
+            )
+            for angle, magnitude in product(angles, self.magnitudes)
+        ]  # fmt: skip
+        return [draw.trial(k, [push]) for k, push in repeated(pushes, self.repeats, number)]
 
 
 @dataclass(frozen=True)
@@ -126,13 +127,12 @@ class Margin(Part):
     SIZE: ClassVar[str] = "runs"
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        trials: list[Trial] = []
-        for angle in self.directions:
-            for level in self.levels:
-                limit = draw.limits.ankle(angle, draw.standard.push_duration)
-                push = draw.push(angle, level * limit)
-                for _ in range(self.runs):
-                    trials.append(
-                        draw.trial(number + len(trials), [push], part="margin", level=f"{level:g}")
-                    )
-        return trials
+        duration = draw.standard.push_duration
+        cases = [
+            (draw.push(angle, level * draw.limits.ankle(angle, duration)), f"{level:g}")
+            for angle, level in product(self.directions, self.levels)
+        ]
+        return [
+            draw.trial(k, [push], level=level)
+            for k, (push, level) in repeated(cases, self.runs, number)
+        ]

@@ -1,23 +1,22 @@
 """Trials are drawn here: every draw depends on the seed and the trial's number alone."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Self, TypedDict, Unpack
+from typing import Any, ClassVar, Self, TypeVar
 
 import mujoco
 import numpy as np
 
-from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.balance.config import StartNoise
 from poise.envs.physics.pushes.options import check_body
-from poise.envs.physics.pushes.push import Kick, Push
+from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import Range, push_bodies
 from poise.envs.sensing.realism import IDEAL
-from poise.envs.terrain.terrain import Terrain
 from poise.training.benchmarking.trials.push_limits import PushLimits
-from poise.training.benchmarking.trials.trial import Conditions, Trial
+from poise.training.benchmarking.trials.trial import Trial
 
+T = TypeVar("T")
 MOST_TRIALS = 100_000  # all are drawn before the first is played
 Recovered = Mapping[str, Sequence[bool]]  # controller → outcome of each trial of the first stage
 
@@ -36,21 +35,6 @@ class Standard:
     body: str | None = None  # the robot's first push body
     realism: str = field(default=IDEAL, metadata={"omit": "default"})  # a level or a file of one
     noise: StartNoise = field(default_factory=StartNoise)
-
-
-class Marks(TypedDict, total=False):
-    """Fields that say which place a trial has in its suite, its conditions, and how it walks."""
-
-    part: str
-    stage: int
-    factor: str | None
-    level: str | None
-    conditions: Conditions
-    commands: tuple[TimedCommand, ...]
-    kicks: tuple[Kick, ...]
-    terrain: Terrain | None
-    motion: str | None
-    share: float | None
 
 
 class Draw:
@@ -84,12 +68,12 @@ class Draw:
         standard = self.standard
         return Push(self.bodies[0], standard.start, standard.push_duration, impulse, angle)
 
-    def trial(self, number: int, pushes: Iterable[Push], **marks: Unpack[Marks]) -> Trial:
-        """A trial with its own seed and its first push over the limit."""
+    def trial(self, number: int, pushes: Iterable[Push] = (), **others: Any) -> Trial:
+        """A trial with its own seed and its first push over the limit; `others` are more fields."""
         pushes = tuple(pushes)
         fraction = self.limits.fraction(pushes[0]) if pushes else None
         seed = start_seed(self.seed, number)
-        return Trial(number, seed, pushes, limit_fraction=fraction, **marks)
+        return Trial(number, seed, pushes, limit_fraction=fraction, **others)
 
     def spread(
         self, number: int, ranges: Iterable[tuple[float, float, float, int]], stage: int
@@ -101,7 +85,7 @@ class Draw:
                 here = number + len(trials)
                 fraction = (part + generator(self.seed, here).uniform()) / count
                 push = self.push(angle, low + fraction * (high - low))
-                trials.append(self.trial(here, [push], part="envelope", stage=stage))
+                trials.append(self.trial(here, [push], stage=stage))
         return trials
 
     def stratified(self, number: int, count: int, fractions: Range) -> list[tuple[float, float]]:
@@ -136,7 +120,8 @@ class Draw:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a suite: trials of one kind."""
+    """A part of a suite: trials of one kind. Their `part` is the name that the suite has for it,
+    but where they have one already."""
 
     SIZE: ClassVar[str] = "trials"  # the field that says how many
 
@@ -171,6 +156,11 @@ def start_seed(seed: int, number: int) -> int:
 def generator(seed: int, number: int) -> np.random.Generator:
     """Draws the push of a trial, apart from what disturbs its start."""
     return np.random.default_rng(np.random.SeedSequence([seed, number, 1]))
+
+
+def repeated(cases: Iterable[T], trials: int, number: int) -> Iterator[tuple[int, T]]:
+    """The number of each trial, from `number` on, and its case; every case has `trials`."""
+    return enumerate((case for case in cases for _ in range(trials)), number)
 
 
 def check_rising(pair: Range, name: str) -> None:

@@ -67,10 +67,10 @@ class Factors(Part):
         trials: list[Trial] = []
         for cell in self._cells(draw):
             for k, (angle, fraction) in enumerate(drawn):
-                pushes = repeated(cell.push(draw, angle, fraction), cell.count, draw)
+                pushes = repeats_of(cell.push(draw, angle, fraction), cell.count, draw)
                 trial = draw.trial(
-                    number + len(trials), pushes, part="factors", factor=cell.factor,
-                    level=cell.level, conditions=cell.conditions,
+                    number + len(trials), pushes, factor=cell.factor, level=cell.level,
+                    conditions=cell.conditions,
                 )  # fmt: skip
                 trials.append(replace(trial, seed=start_seed(draw.seed, number + k)))
         return trials
@@ -80,14 +80,9 @@ class Factors(Part):
         cells = [Cell("duration", f"{d:g}", duration=d) for d in levels.duration]
         cells += [Cell("body", body, body=body) for body in (draw.bodies if levels.body else ())]
         cells += [Cell("height", f"{h:.2f}", point=draw.point(first, h)) for h in levels.height]
-        cells += [
-            Cell("friction", f"{f:g}", conditions=Conditions(friction=f)) for f in levels.friction
-        ]
-        cells += [Cell("delay", f"{d:g}", conditions=Conditions(delay=d)) for d in levels.delay]
-        cells += [Cell("mass_error", f"{e:g}", conditions=Conditions(mass_error=e))
-                  for e in levels.mass_error]  # fmt: skip
-        cells += [Cell("velocity_noise", f"{v:g}", conditions=Conditions(velocity_noise=v))
-                  for v in levels.velocity_noise]  # fmt: skip
+        for name in ("friction", "delay", "mass_error", "velocity_noise"):
+            cells += [Cell(name, f"{value:g}", conditions=Conditions(**{name: value}))
+                      for value in getattr(levels, name)]  # fmt: skip
         cells += [Cell("realism", r, conditions=Conditions(realism=r)) for r in levels.realism]
         cells += [Cell("pushes", f"{n:g}", count=n) for n in levels.pushes]
         others = [cell for cell in cells if standard[cell.factor] != cell.level]
@@ -134,10 +129,10 @@ class Mix(Part):
             mass_error=float(rng.uniform(*self.mass_error)),
         )
         count = 2 if rng.uniform() < self.repeated else 1
-        return draw.trial(number, repeated(push, count, draw), part="mix", conditions=conditions)
+        return draw.trial(number, repeats_of(push, count, draw), conditions=conditions)
 
 
-def repeated(push: Push, count: int, draw: Draw) -> list[Push]:
+def repeats_of(push: Push, count: int, draw: Draw) -> list[Push]:
     """The same push `count` times, the suite's interval from start to start."""
     interval = draw.standard.interval
     return [replace(push, start=push.start + k * interval) for k in range(count)]

@@ -108,7 +108,7 @@ class Motions(Part):
                 start = float(moment) * draw.motions[name]
                 push = replace(draw.push(angle, share * j50(angle)), start=start)
                 pushes = [push] if share else []
-                trial = draw.trial(number + len(trials), pushes, part=PART, stage=stage,
-                                   motion=name, share=share)  # fmt: skip
+                trial = draw.trial(number + len(trials), pushes, stage=stage, motion=name,
+                                   share=share)  # fmt: skip
                 trials.append(replace(trial, seed=start_seed(draw.seed, drawn)))
         return trials

@@ -22,6 +22,7 @@ Finished = Mapping[tuple[str, int], Outcome]  # controller, number of the trial 
 class _Planned(NamedTuple):
     """A part at a level."""
 
+    name: str  # that the suite has for it
     part: Part
     level: str | None  # None: the suite's own
     first: list[Trial]  # of the first stage
@@ -66,8 +67,8 @@ class Plan:
                 following = second + part.second_count(len(self.names))
                 if level is None or name != "factors":
                     shift = number - drawn
-                    trials = self._at(level, shift, first)
-                    self._parts.append(_Planned(part, level, trials, second, shift))
+                    trials = self._at(name, level, shift, first)
+                    self._parts.append(_Planned(name, part, level, trials, second, shift))
                     number += following - drawn
                 drawn = following
         self.first = [trial for planned in self._parts for trial in planned.first]
@@ -80,8 +81,8 @@ class Plan:
         """Whether the controller of this name plays a trial of the first stage."""
         return name not in self._standing or not trial.commands
 
-    def _at(self, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
-        """The trials at a level; None: the suite's, where they have none of their own.
+    def _at(self, name: str, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
+        """The trials of a part at a level; None: the suite's, where they have none of their own.
 
         A scenario's own level has the last word in the suite's.
         """
@@ -89,15 +90,16 @@ class Plan:
         found = []
         for trial in trials:
             own = at = trial.conditions.realism
+            part = trial.part or name
             if real != IDEAL and (own is None or level is not None):
                 at = real
-            elif real != IDEAL and trial.part == SCENARIOS:
+            elif real != IDEAL and part == SCENARIOS:
                 at = f"{real}+{own}"
             found.append(
                 replace(
                     trial,
                     number=trial.number + shift,
-                    part=trial.part if level is None else at_level(trial.part, level),
+                    part=part if level is None else at_level(part, level),
                     conditions=replace(trial.conditions, realism=at),
                 )
             )
@@ -106,7 +108,7 @@ class Plan:
     def second(self, finished: Finished) -> dict[str, list[Trial]]:
         """controller → its trials of the second stage; `finished` must hold all of the first."""
         chosen: dict[str, list[Trial]] = {name: [] for name in self.names}
-        for part, level, first, number, shift in self._parts:
+        for key, part, level, first, number, shift in self._parts:
             recovered = {
                 name: [
                     finished[name, trial.number].recovered
@@ -116,7 +118,7 @@ class Plan:
                 for name in self.names
             }
             for name, trials in part.second(self._draw, number, first, recovered).items():
-                chosen[name] += self._at(level, shift, trials)
+                chosen[name] += self._at(key, level, shift, trials)
         return chosen
 
     def trials(self, finished: Finished) -> dict[str, list[Trial]]:

@@ -36,11 +36,10 @@ class Random(Part):
         check_forces(self.pushes)
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        trials = []
-        for here in range(number, number + self.trials):
-            pushes = sampled(self.pushes, draw.bodies, draw, generator(draw.seed, here))
-            trials.append(draw.trial(here, pushes, part="random"))
-        return trials
+        return [
+            draw.trial(k, sampled(self.pushes, draw.bodies, draw, generator(draw.seed, k)))
+            for k in range(number, number + self.trials)
+        ]
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class Sequence(Part):
         trials = []
         for here in range(number, number + self.trials):
             pushes = one_after_the_other(self.pushes, self.later, self.until, draw, here)
-            trials.append(Trial(here, start_seed(draw.seed, here), pushes, part="sequence"))
+            trials.append(Trial(here, start_seed(draw.seed, here), pushes))
         return trials
 
 
@@ -84,7 +83,7 @@ class Quiet(Part):
     trials: int = field(default=20, metadata={"min": 1, "max": MOST_TRIALS})
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        return [draw.trial(k, (), part="quiet") for k in range(number, number + self.trials)]
+        return [draw.trial(k) for k in range(number, number + self.trials)]
 
 
 def sampled(

@@ -74,7 +74,7 @@ class Scenarios(Part):
                     Trial(
                         number + len(trials), start_seed(draw.seed, number + k),
                         scenario.drawn(draw, number + k), Conditions(realism=level),
-                        part=PART, level=name, commands=commands, until=scenario.duration,
+                        level=name, commands=commands, until=scenario.duration,
                     )
                 )  # fmt: skip
         return trials

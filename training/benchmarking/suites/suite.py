@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
@@ -108,21 +106,4 @@ def load_suite(name: str | Path) -> Suite:
     Raises ConfigError naming the file, the field and the choices.
     """
     path = resolve("suites", name)
-    data = read_yaml(path)
-    if "kind" in data:
-        raise _of_old_form(data, path)
-    return build(Suite, data, str(path))
-
-
-def _of_old_form(data: dict[str, Any], path: Path) -> ConfigError:
-    """Return what a suite of one part, which its `kind` named, is to say today."""
-    kind = data["kind"]
-    if not isinstance(kind, str) or kind not in PARTS:
-        part = "random: {trials: 200}"
-    else:
-        own = {k: v for k, v in data.items() if k not in {*Standard.__dataclass_fields__, "kind"}}
-        part = yaml.safe_dump({kind: own}, default_flow_style=True, sort_keys=False, width=10_000)
-        part = part.strip()[1:-1]
-    return ConfigError(
-        f"a suite names its parts now: {part}", source=path, field="kind", choices=PARTS
-    )
+    return build(Suite, read_yaml(path), str(path))

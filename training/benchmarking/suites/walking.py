@@ -7,6 +7,7 @@ whatever their size and direction.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from poise.envs.terrain.terrain import Terrain, seeded
 from poise.training.benchmarking.trials.trial import Trial
 
 from .directions import Envelope
-from .draw import MOST_TRIALS, Draw, Part, Recovered, generator
+from .draw import MOST_TRIALS, Draw, Part, Recovered, generator, repeated
 from .random import Sequence as PushSequence
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
@@ -37,6 +38,11 @@ def command_text(command: GaitCommand) -> str:
     return ", ".join(said) or "stand"
 
 
+def told(command: GaitCommand) -> dict[str, Any]:
+    """The fields of a trial in which this command holds all the time."""
+    return {"level": command_text(command), "commands": (from_start(command),)}
+
+
 @dataclass(frozen=True)
 class Walk(Part):
     """Every command, `trials` times, from differently disturbed starts and without a push."""
@@ -49,12 +55,8 @@ class Walk(Part):
             raise ValueError("commands: must not be empty")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        each = [command for command in self.commands for _ in range(self.trials)]
-        return [
-            draw.trial(number + k, (), part="walk", level=command_text(command),
-                       commands=(from_start(command),))
-            for k, command in enumerate(each)
-        ]  # fmt: skip
+        each = repeated(self.commands, self.trials, number)
+        return [draw.trial(k, **told(command)) for k, command in each]
 
 
 @dataclass(frozen=True)
@@ -62,9 +64,6 @@ class Gait(Walk):
     """The same for commands with step parameters: whether the steps are as told."""
 
     commands: tuple[GaitCommand, ...] = (GaitCommand(0.5, step_length=0.2),)
-
-    def first(self, draw: Draw, number: int) -> list[Trial]:
-        return [replace(trial, part="gait") for trial in super().first(draw, number)]
 
 
 @dataclass(frozen=True)
@@ -86,11 +85,8 @@ class Velocity(Part):
             raise ValueError("courses: needs one command or more in each")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        each = [(name, course) for name, course in self.courses.items() for _ in range(self.trials)]
-        return [
-            draw.trial(number + k, (), part="velocity", level=name, commands=course)
-            for k, (name, course) in enumerate(each)
-        ]
+        each = repeated(self.courses.items(), self.trials, number)
+        return [draw.trial(k, level=name, commands=course) for k, (name, course) in each]
 
 
 @dataclass(frozen=True)
@@ -106,12 +102,11 @@ class Walking:
         shift = np.random.default_rng(np.random.SeedSequence([draw.seed, 3])).uniform()
         return float(self.start + (shift + GOLDEN * number) % 1.0 * self.window / draw.robot.omega)
 
-    def walking(self, draw: Draw, trials: Iterable[Trial], part: str) -> list[Trial]:
+    def walking(self, draw: Draw, trials: Iterable[Trial]) -> list[Trial]:
         """The trials with this command, their only push at its time."""
         return [
             replace(
-                trial, part=part, level=command_text(self.command),
-                commands=(from_start(self.command),),
+                trial, **told(self.command),
                 pushes=tuple(replace(p, start=self.begins(draw, trial.number))
                              for p in trial.pushes),
             )
@@ -124,13 +119,13 @@ class WalkPush(Walking, Envelope):
     """J50 in each of many directions while it walks, as an `Envelope` finds it, at all phases."""
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        return self.walking(draw, super().first(draw, number), "walk_push")
+        return self.walking(draw, super().first(draw, number))
 
     def second(
         self, draw: Draw, number: int, first: Sequence[Trial], recovered: Recovered
     ) -> dict[str, list[Trial]]:
         chosen = super().second(draw, number, first, recovered)
-        return {name: self.walking(draw, own, "walk_push") for name, own in chosen.items()}
+        return {name: self.walking(draw, own) for name, own in chosen.items()}
 
 
 @dataclass(frozen=True)
@@ -145,16 +140,15 @@ class WalkKick(Walking, Part):
             raise ValueError("speeds: must not be empty")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        each = [speed for speed in self.speeds for _ in range(self.trials)]
-        return [self._trial(draw, number + k, speed) for k, speed in enumerate(each)]
+        each = repeated(self.speeds, self.trials, number)
+        return [self._trial(draw, k, speed) for k, speed in each]
 
     def _trial(self, draw: Draw, number: int, speed: float) -> Trial:
         x, y = generator(draw.seed, number).uniform(-speed, speed, 2)
         way = float(np.degrees(np.arctan2(y, x)))
         kick = Kick(self.begins(draw, number), float(np.hypot(x, y)), way)
         commands = (from_start(self.command),)
-        return draw.trial(number, (), part="walk_kick", level=f"± {speed:g} m/s",
-                          commands=commands, kicks=(kick,))  # fmt: skip
+        return draw.trial(number, level=f"± {speed:g} m/s", commands=commands, kicks=(kick,))
 
 
 @dataclass(frozen=True)
@@ -164,11 +158,7 @@ class WalkRepeated(PushSequence):
     command: GaitCommand = field(default_factory=lambda: GaitCommand(0.5))
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        level, commands = command_text(self.command), (from_start(self.command),)
-        return [
-            replace(trial, part="walk_repeated", level=level, commands=commands)
-            for trial in super().first(draw, number)
-        ]
+        return [replace(trial, **told(self.command)) for trial in super().first(draw, number)]
 
 
 #: parts of a suite for controllers that walk
@@ -191,9 +181,8 @@ class Terrains(Part):
             raise ValueError("terrains: must not be empty")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        each = [pair for pair in self.terrains.items() for _ in range(self.trials)]
+        commands = (from_start(self.command),)
         return [
-            draw.trial(number + k, (), part="terrains", level=name, terrain=seeded(terrain, k),
-                       commands=(from_start(self.command),))
-            for k, (name, terrain) in enumerate(each)
-        ]  # fmt: skip
+            draw.trial(k, level=name, terrain=seeded(terrain, k - number), commands=commands)
+            for k, (name, terrain) in repeated(self.terrains.items(), self.trials, number)
+        ]

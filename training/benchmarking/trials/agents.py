@@ -45,23 +45,15 @@ from .names import NO_CONTROL, check_name
 
 @dataclass(frozen=True, eq=False)
 class Agent:
-    """A name, an environment, and what to do in it.
+    """A name, an environment, and what to do in it."""
 
-    Attributes:
-        name: as the user wrote it.
-        env: the environment it acts in.
-        act: deterministic action (na,) for an observation (no,).
-        fingerprint: hash of the controller's configuration and the policy's weights.
-        begin: called at the start of every trial, for policies with a memory.
-        timesteps: environment steps that a policy of `poise train` has learned from.
-    """
-
-    name: str
-    env: BalanceEnv
-    act: Callable[[np.ndarray], np.ndarray]
-    fingerprint: str
+    name: str  #: as the user wrote it
+    env: BalanceEnv  #: the environment it acts in
+    act: Callable[[np.ndarray], np.ndarray]  #: deterministic action (na,) for an observation (no,)
+    fingerprint: str  #: hash of the controller's configuration and the policy's weights
+    #: called at the start of every trial, for policies with a memory
     begin: Callable[[], object] | None = None
-    timesteps: int | None = None
+    timesteps: int | None = None  #: environment steps that a policy of `poise train` learned from
 
 
 def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:

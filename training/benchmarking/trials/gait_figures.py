@@ -8,6 +8,7 @@ import numpy as np
 
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand
+from poise.envs.compiled.maths.runs import runs_of
 
 from .gait_record import WalkArrays, step_error, steps_of
 
@@ -31,13 +32,11 @@ def touchdowns(record: WalkArrays) -> Touchdowns:
     """Touchdowns of feet that were in the air for 0.08 s."""
     found: list[tuple[int, int]] = []
     for foot in range(record.down.shape[1]):
-        down = record.down[:, foot]
-        lifted = np.flatnonzero(down[:-1] & ~down[1:]) + 1
-        landed = np.flatnonzero(~down[:-1] & down[1:]) + 1
-        for row in landed:
-            before = lifted[lifted < row]
-            if len(before) and record.time[row] - record.time[before[-1]] >= AIR_TIME - 1e-9:
-                found.append((int(row), foot))
+        for lifted, landed in runs_of(~record.down[:, foot]).tolist():
+            if lifted == 0 or landed == len(record.time):  # it has not lifted off, or not landed
+                continue
+            if record.time[landed] - record.time[lifted] >= AIR_TIME - 1e-9:
+                found.append((landed, foot))
     rows = np.array(sorted(found), dtype=int).reshape(-1, 2)
     return Touchdowns(rows[:, 0], rows[:, 1])
 
@@ -198,8 +197,7 @@ class Walk:
         r, worst = self.record, 0.0
         for foot in range(r.down.shape[1]):
             alone = self._known & r.down[:, foot] & (r.down.sum(axis=1) == 1)
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], alone, [0]]).astype(int)))
-            for first, last in edges.reshape(-1, 2):
+            for first, last in runs_of(alone):
                 ways = r.feet[first:last, foot] - r.feet[first, foot]
                 worst = max(worst, float(np.linalg.norm(ways, axis=1).max()))
         return worst if self._known.any() else None

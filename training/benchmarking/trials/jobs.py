@@ -20,22 +20,15 @@ from .variants import AgentVariants
 
 @dataclass(frozen=True)
 class Stage:
-    """The robot, duration and noise that all trials of a suite share.
+    """The robot, duration and noise that all trials of a suite share."""
 
-    Attributes:
-        robot: name or path.
-        duration: of a trial [s].
-        noise: of the start.
-        motions: name and file (or packaged name) of each motion that trials perform. Falls are
-            relative to these then.
-        tempo: at which they are played.
-    """
-
-    robot: str | Path
-    duration: float
-    noise: StartNoise
+    robot: str | Path  #: name or path
+    duration: float  #: of a trial [s]
+    noise: StartNoise  #: of the start
+    #: name and file (or packaged name) of each motion that trials perform; falls are relative to
+    #: these then
     motions: tuple[tuple[str, str], ...] = ()
-    tempo: Tempo = field(default_factory=Tempo)
+    tempo: Tempo = field(default_factory=Tempo)  #: at which they are played
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""

@@ -20,7 +20,8 @@ class Signals:
     """
 
     def __init__(self) -> None:
-        self._rows: list[tuple[object, ...]] = []
+        self._times: list[float] = []
+        self._rows: list[dict[str, object]] = []
         self._origin, self._axes = np.zeros(2), np.eye(2)
 
     def __call__(self, env: BalanceEnv) -> None:
@@ -31,25 +32,23 @@ class Signals:
         support = self._local(state.support_polygon)
         load = np.abs(env.simulation.views.ctrl) / env.robot.torque_limit
         momentum = state.angular_momentum
-        self._rows.append((
-            env.simulation.time,
-            self._local(state.com[:2]),
-            self._local(state.cop),
-            self._local(state.capture_point),
-            np.stack([support.min(axis=0), support.max(axis=0)], axis=1),
-            np.append(momentum[:2] @ self._axes, momentum[2]),
-            float(load.max()),
-        ))  # fmt: skip
+        self._times.append(env.simulation.time)
+        self._rows.append({
+            "com": self._local(state.com[:2]),
+            "cop": self._local(state.cop),
+            "capture_point": self._local(state.capture_point),
+            "support": np.stack([support.min(axis=0), support.max(axis=0)], axis=1),
+            "angular_momentum": np.append(momentum[:2] @ self._axes, momentum[2]),
+            "torque": float(load.max()),
+        })  # fmt: skip
 
     @property
     def t(self) -> np.ndarray:
-        return np.array([row[0] for row in self._rows])
+        return np.array(self._times)
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        names = ("com", "cop", "capture_point", "support", "angular_momentum", "torque")
-        columns = zip(*(row[1:] for row in self._rows), strict=True)
-        return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+        return {name: np.array([row[name] for row in self._rows]) for name in self._rows[0]}
 
     def _local(self, points: np.ndarray) -> np.ndarray:
         return (points - self._origin) @ self._axes

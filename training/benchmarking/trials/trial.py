@@ -11,20 +11,13 @@ from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis
 
 @dataclass(frozen=True)
 class Conditions:
-    """The difference of a trial's robot from the one that its controller knows.
+    """The difference of a trial's robot from the one that its controller knows."""
 
-    Attributes:
-        friction: of floor and soles; None: the robot's own.
-        delay: of the sensors [s].
-        mass_error: by which all masses differ from those that the controller knows.
-        velocity_noise: standard deviation of measured joint velocities [rad/s].
-        realism: name or file of a level, in which the other fields have the last word; None: ideal.
-    """
-
-    friction: float | None = None
-    delay: float = 0.0
-    mass_error: float = 0.0
-    velocity_noise: float = 0.0
+    friction: float | None = None  #: of floor and soles; None: the robot's own
+    delay: float = 0.0  #: of the sensors [s]
+    mass_error: float = 0.0  #: by which all masses differ from those that the controller knows
+    velocity_noise: float = 0.0  #: standard deviation of measured joint velocities [rad/s]
+    #: name or file of a level, in which the other fields have the last word; None: ideal
     realism: str | None = None
 
 
@@ -33,42 +26,27 @@ STANDARD_CONDITIONS = Conditions()  # the robot as its controller knows it
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial that controllers meet alike.
+    """A trial that controllers meet alike."""
 
-    Attributes:
-        number: of the trial within its suite.
-        seed: of the disturbed start.
-        pushes: one after the other; none where the robot only stands.
-        conditions: in which it is played.
-        limit_fraction: impulse of the only push over its limit (see `PushLimits.scale`), of
-            repeated pushes that of each.
-        part: of the suite.
-        stage: 2 if it was chosen by the outcome of earlier ones.
-        factor: which factor the trial varies; "standard" for the case they are compared with.
-        level: the factor's value, as text.
-        commands: that a controller that walks follows, in the order of time; none: it stands.
-        kicks: sudden changes of the root's velocity.
-        terrain: that it is played on; None: that of the environment.
-        motion: that is performed, by its name in the suite; None: that of the environment.
-        share: of the controller's J50 that the push is.
-        until: when it ends [s]; None: when those of its suite do.
-    """
-
-    number: int
-    seed: int
-    pushes: tuple[Push, ...] = ()
-    conditions: Conditions = STANDARD_CONDITIONS
+    number: int  #: within its suite
+    seed: int  #: of the disturbed start
+    pushes: tuple[Push, ...] = ()  #: one after the other; none where the robot only stands
+    conditions: Conditions = STANDARD_CONDITIONS  #: in which it is played
+    #: impulse of the only push over its limit (see `PushLimits.scale`), of repeated ones of each
     limit_fraction: float | None = None
-    part: str = ""
-    stage: int = 1
+    part: str = ""  #: of the suite
+    stage: int = 1  #: 2 if it was chosen by the outcome of earlier ones
+    #: which factor it varies; "standard" for the case that others are compared with
     factor: str | None = None
-    level: str | None = None
+    level: str | None = None  #: the factor's value, as text
+    #: that a controller that walks follows, in the order of time; none: it stands
     commands: tuple[TimedCommand, ...] = ()
-    kicks: tuple[Kick, ...] = ()
-    terrain: Terrain | None = None
+    kicks: tuple[Kick, ...] = ()  #: sudden changes of the root's velocity
+    terrain: Terrain | None = None  #: that it is played on; None: that of the environment
+    #: that is performed, by its name in the suite; None: that of the environment
     motion: str | None = None
-    share: float | None = None
-    until: float | None = None
+    share: float | None = None  #: of the controller's J50 that the push is
+    until: float | None = None  #: when it ends [s]; None: when those of its suite do
 
     @property
     def command(self) -> TimedCommand | None:
@@ -92,112 +70,82 @@ class TrialFigures:
     """The figures of a trial. Distances [m], times [s]; None where there is no such value, or
     where a simulation has blown up.
 
-    Attributes:
-        recovered: upright, quiet and with feet at rest for the last second; of a walk that goes on,
-            not fallen, and in the last two strides as commanded, see `Walk.as_commanded`; on a
-            terrain, not fallen and beyond its last edge; where a motion is performed, not fallen.
-        fallen: whether it fell; `fall_time` counts from the reset.
-        recovery_time: from the start of the last push to the last moment that was not quiet.
-        foot_displaced: a foot moved more than 5 cm; the column `stepped` of trials.csv.
-        steps: touchdowns of feet that were in the air for 0.08 s.
-        max_com, max_capture: largest distance of CoM and capture point from the soles' centre.
-        min_cop_margin: smallest distance of the CoP from the edge of the support.
-        max_slide: largest distance of a sole from where it started.
-        energy: ∫ Σ |τ q̇| dt [J].
-        peak_torque: largest |τ| over its limit.
-        saturation: fraction of motors and ticks at the limit.
-        mean_power: ∫ Σ |τ q̇| dt over the time that was played [W].
-        torque_variation: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors,
-            over the time that was played [1/s]. A torque that goes from one limit to the other and
-            back once a second has 4; one that hums has more.
-        solver_failures: ticks at which the QP was not solved.
-        mean_abs_action: mean |action| after the first second.
-        com_drift: without a push, largest horizontal distance of the CoM from where it was after
-            the first second.
-        foot_drift: the same of a sole.
-        final_speed: |ċ| at the end [m/s].
-        final_lean: of the root from the described posture at the end [°].
-        root_force: largest force [N] that a soft root took from nowhere; 0 with a hard root.
-        sway, sway_recovery: body sway [rad] and recovery time by the sway's speed, of a recovered
-            push, see `training/benchmarking/statistics/eurobench.py`.
-        speed_ahead, speed_left, turn_rate: means over the strides of a walk [m/s, rad/s]. A stride
-            is two steps; those count, for this and what follows, that begin 4 s or more after the
-            last change of the command and end a second or more before a fall.
-        speed_error, speed_error_rms: mean and root mean square over the strides of the distance
-            of their velocity from the command [m/s].
-        turn_error_rms: root mean square over the strides of the turn's error [rad/s].
-        step_length, step_width, step_time: means over the steps [m, m, s], of a sole that lands
-            from the other one, along the heading and across it, and between touchdowns.
-        swing_time, step_clearance: from lift-off to touchdown [s]; of the sole's middle at its
-            highest above where it lands [m]; means over the steps.
-        step_error: largest deviation of a step parameter from its command, as a fraction, among
-            those that are commanded: step time, step length, width, clearance. A step time is
-            that from touchdown to touchdown but for the gait's time on both feet.
-        yaw_momentum: root mean square of the angular momentum about the vertical [N·m·s].
-        cost_of_transport: ∫ Σ |τ q̇| dt / (m g d), d the way; `positive_cost_of_transport` of the
-            work Σ max(τ q̇, 0) alone.
-        knee_mean, knee_peak: |τ|/m of the stance leg's knee on one foot [N·m/kg], at the ends of
-            policy steps.
-        circle_error: of one command that is a circle, largest distance of the walk from it, around
-            the middle that the walk goes round.
-        foot_slide: largest way of a sole that bears the robot alone.
-        push_phase: phase of the stride at the start of the first push or kick: 0 where the left
-            foot lands, 0.5 where the right one does.
-        edge_contacts: times that a foot came to touch an edge of the terrain.
-        surfaces_passed: of a terrain, of which the CoM has passed the beginning; stairs climbed.
-        joint_rms, body_error, body_error_root, body_error_last, com_error, sole_slide,
-            motion_delay, swing_error, placement_error, support_slide, interruptions: of a motion
-            that is performed, see `TrackingFigures`.
-        drawn: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`.
-        error: what the controller raised, on one line; the trial then counts as not recovered.
+    Of a walk the strides count, two steps each, that begin 4 s or more after the last change of the
+    command and end a second or more before a fall, and the steps that end them.
     """
 
+    #: upright, quiet and with feet at rest for the last second; of a walk that goes on, not fallen,
+    #: and in the last two strides as commanded, see `Walk.as_commanded`; on a terrain, not fallen
+    #: and beyond its last edge; where a motion is performed, not fallen
     recovered: bool
     fallen: bool
-    fall_time: float | None = None
+    fall_time: float | None = None  #: from the reset
+    #: from the start of the last push to the last moment that was not quiet
     recovery_time: float | None = None
+    #: a foot moved more than 5 cm; the column `stepped` of trials.csv
     foot_displaced: bool = False
-    steps: int = 0
-    max_com: float | None = None
-    max_capture: float | None = None
-    min_cop_margin: float | None = None
-    max_slide: float | None = None
-    energy: float | None = None
-    peak_torque: float | None = None
-    saturation: float = 0.0
-    mean_power: float | None = None
+    steps: int = 0  #: touchdowns of feet that were in the air for 0.08 s
+    max_com: float | None = None  #: largest distance of the CoM from the soles' centre
+    max_capture: float | None = None  #: the same of the capture point
+    min_cop_margin: float | None = None  #: smallest distance of the CoP from the support's edge
+    max_slide: float | None = None  #: largest distance of a sole from where it started
+    energy: float | None = None  #: ∫ Σ |τ q̇| dt [J]
+    peak_torque: float | None = None  #: largest |τ| over its limit
+    saturation: float = 0.0  #: fraction of motors and ticks at the limit
+    mean_power: float | None = None  #: ∫ Σ |τ q̇| dt over the time that was played [W]
+    #: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors, over the time that
+    #: was played [1/s]. A torque that goes from one limit to the other and back once a second has
+    #: 4; one that hums has more
     torque_variation: float | None = None
-    solver_failures: int = 0
-    mean_abs_action: float | None = None
+    solver_failures: int = 0  #: ticks at which the QP was not solved
+    mean_abs_action: float | None = None  #: mean |action| after the first second
+    #: without a push, largest horizontal distance of the CoM from where it was after the first
+    #: second
     com_drift: float | None = None
-    foot_drift: float | None = None
-    final_speed: float | None = None
-    final_lean: float | None = None
+    foot_drift: float | None = None  #: the same of a sole
+    final_speed: float | None = None  #: |ċ| at the end [m/s]
+    final_lean: float | None = None  #: of the root from the described posture at the end [°]
+    #: largest force [N] that a soft root took from nowhere; 0 with a hard root
     root_force: float | None = None
+    #: body sway [rad] of a recovered push, see `training/benchmarking/statistics/eurobench.py`
     sway: float | None = None
-    sway_recovery: float | None = None
-    speed_ahead: float | None = None
-    speed_left: float | None = None
-    turn_rate: float | None = None
+    sway_recovery: float | None = None  #: recovery time by the sway's speed
+    speed_ahead: float | None = None  #: mean over the strides of a walk [m/s]
+    speed_left: float | None = None  #: the same
+    turn_rate: float | None = None  #: the same [rad/s]
+    #: mean over the strides of the distance of their velocity from the command [m/s]
     speed_error: float | None = None
-    speed_error_rms: float | None = None
-    turn_error_rms: float | None = None
+    speed_error_rms: float | None = None  #: its root mean square
+    turn_error_rms: float | None = None  #: root mean square of the turn's error [rad/s]
+    #: mean over the steps, of a sole that lands from the other one, along the heading
     step_length: float | None = None
-    step_width: float | None = None
-    step_time: float | None = None
-    swing_time: float | None = None
+    step_width: float | None = None  #: the same across the heading
+    step_time: float | None = None  #: between touchdowns, mean over the steps
+    swing_time: float | None = None  #: from lift-off to touchdown, mean over the steps
+    #: of the sole's middle at its highest above where it lands, mean over the steps
     step_clearance: float | None = None
+    #: largest deviation of a step parameter from its command, as a fraction, among those that are
+    #: commanded: step time, step length, width, clearance. A step time is that from touchdown to
+    #: touchdown but for the gait's time on both feet
     step_error: float | None = None
+    #: root mean square of the angular momentum about the vertical [N·m·s]
     yaw_momentum: float | None = None
-    cost_of_transport: float | None = None
-    positive_cost_of_transport: float | None = None
+    cost_of_transport: float | None = None  #: ∫ Σ |τ q̇| dt / (m g d), d the way
+    positive_cost_of_transport: float | None = None  #: of the work Σ max(τ q̇, 0) alone
+    #: mean |τ|/m of the stance leg's knee on one foot, at the ends of policy steps [N·m/kg]
     knee_mean: float | None = None
-    knee_peak: float | None = None
+    knee_peak: float | None = None  #: the largest
+    #: of one command that is a circle, largest distance of the walk from it, around the middle that
+    #: the walk goes round
     circle_error: float | None = None
-    foot_slide: float | None = None
+    foot_slide: float | None = None  #: largest way of a sole that bears the robot alone
+    #: phase of the stride at the start of the first push or kick: 0 where the left foot lands, 0.5
+    #: where the right one does
     push_phase: float | None = None
-    edge_contacts: int = 0
+    edge_contacts: int = 0  #: times that a foot came to touch an edge of the terrain
+    #: of a terrain, of which the CoM has passed the beginning; stairs climbed
     surfaces_passed: int | None = None
+    #: from here to `interruptions`: of a motion that is performed, see `TrackingFigures`
     joint_rms: float | None = None
     body_error: float | None = None
     body_error_root: float | None = None
@@ -209,7 +157,9 @@ class TrialFigures:
     placement_error: float | None = None
     support_slide: float | None = None
     interruptions: float | None = None
+    #: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`
     drawn: str | None = None
+    #: what the controller raised, on one line; the trial then counts as not recovered
     error: str | None = None
 
 

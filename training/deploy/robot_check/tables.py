@@ -118,5 +118,6 @@ def _directions(check: RobotCheck) -> Table:
 
 
 def _impulses(in_place: float, one_step: float, mass: float) -> tuple[str, str, str, str]:
-    values = (in_place, in_place / mass, one_step, one_step / mass)
-    return tuple(f"{x:.{n}f}" for x, n in zip(values, (1, 2, 1, 2), strict=True))  # type: ignore[return-value]
+    """Both of them [N·s], each followed by what it is over the mass [N·s/kg]."""
+    per_mass = in_place / mass, one_step / mass
+    return f"{in_place:.1f}", f"{per_mass[0]:.2f}", f"{one_step:.1f}", f"{per_mass[1]:.2f}"

@@ -34,21 +34,15 @@ FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion its
 
 @dataclass(frozen=True)
 class Followed(TrackingFigures):
-    """How near one trial stayed to the motion, until half a second after its end or a fall.
+    """How near one trial stayed to the motion, until half a second after its end or a fall."""
 
-    Attributes:
-        fallen: whether the robot fell.
-        solver_failures: ticks without a solution of the QP.
-        push: the push, as an environment takes it; None for none.
-        walked, turned: of a walk the way along its headings, and the turn, over those that are told
-            while the clip plays; NaN where these are less than 0.2 m or 0.2 rad.
-    """
-
-    fallen: bool
-    solver_failures: int
-    push: dict[str, Any] | None
+    fallen: bool  #: whether the robot fell
+    solver_failures: int  #: ticks without a solution of the QP
+    push: dict[str, Any] | None  #: as an environment takes it; None for none
+    #: of a walk the way along its headings over that which is told while the clip plays; NaN where
+    #: that is less than 0.2 m
     walked: float = np.nan
-    turned: float = np.nan
+    turned: float = np.nan  #: the same of the turn; NaN where less than 0.2 rad is told
 
 
 def follow(

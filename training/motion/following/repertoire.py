@@ -25,17 +25,11 @@ STANDING = "standing"
 
 @dataclass(frozen=True)
 class Repertoire:
-    """The motions that the trials of a suite perform.
+    """The motions that the trials of a suite perform."""
 
-    Attributes:
-        durations: name → duration [s].
-        digests: name → hash of what decides it.
-        clips: name → the robot's postures, of those that are not keyframes.
-    """
-
-    durations: dict[str, float]
-    digests: dict[str, str]
-    clips: dict[str, RobotClip]
+    durations: dict[str, float]  #: name → duration [s]
+    digests: dict[str, str]  #: name → hash of what decides it
+    clips: dict[str, RobotClip]  #: name → the robot's postures, of those that are not keyframes
 
     def write(self, folder: Path) -> None:
         """Keep the clips in the folder of the results; raises PoiseError when the disk refuses."""

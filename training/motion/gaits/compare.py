@@ -4,11 +4,11 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from poise.baselines.allowance import allows
-from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, write_atomic
@@ -16,7 +16,7 @@ from poise.configs.numbers import whole_number
 from poise.configs.outputs import check_out_folder
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.evaluation.evaluate import evaluate
-from poise.training.benchmarking.evaluation.tick_times import Clocked
+from poise.training.benchmarking.evaluation.tick_times import clocked
 from poise.training.benchmarking.statistics.rates import mean_or_none
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import Agent, check_walks, load_agent
@@ -26,7 +26,8 @@ from poise.training.running.folder_lock import FolderLock
 from poise.training.running.terminal import terminal
 
 from .figures import GaitFigures, stance_plot
-from .stance import KneeMoment, StanceRecord, Stances, load_knee_moment
+from .knee_moment import POINTS, KneeMoment, load_knee_moment
+from .stance import StanceRecord, Stances
 
 SETTLED = 5.0  # [s] after which stances count
 TICKS_FROM = 3.0  # [s] after which ticks are timed, for so long
@@ -150,18 +151,17 @@ def figures_of(
     """The figures of walks: falls of all of them, the rest of those that did not fall."""
     stood = [outcome for outcome in outcomes if not outcome.fallen]
     means = {key: mean_or_none([getattr(each, key) for each in stood]) for key in MEANS}
-    curves = np.concatenate([each.knees for each in stances]) if stances else np.zeros((0, 1))
-    curve = curves.mean(axis=0) if len(curves) else np.zeros(0)
-    off = curve - band.curves()[0] if len(curves) else None
-    peaks = np.concatenate([each.peaks for each in stances]) if stances else np.zeros(0)
+    knees = np.concatenate([np.zeros((0, POINTS)), *(each.knees for each in stances)])
+    found: dict[str, Any] = {"knee_stance": None, "knee_rmse": None, "knee_curve": ()}
+    if len(knees):
+        curve = knees.mean(axis=0)
+        off = curve - band.curves()[0]
+        found = {"knee_stance": float(np.abs(knees).mean()), "knee_curve": tuple(curve.tolist()),
+                 "knee_rmse": float(np.sqrt(np.mean(off**2)))}  # fmt: skip
     return GaitFigures(
         controller=name, speed=speed, starts=len(outcomes), falls=len(outcomes) - len(stood),
-        **means,
-        knee_stance=float(np.abs(curves).mean()) if len(curves) else None,
-        knee_rmse=None if off is None else float(np.sqrt(np.mean(off**2))),
-        force_peak=float(peaks.mean()) if len(peaks) else None,
-        height_amplitude=mean_or_none([each.height_amplitude for each in stances]),
-        knee_curve=tuple(float(value) for value in curve), tick=tick,
+        **means, **found, force_peak=mean_or_none([p for each in stances for p in each.peaks]),
+        height_amplitude=mean_or_none([each.height_amplitude for each in stances]), tick=tick,
     )  # fmt: skip
 
 
@@ -175,21 +175,16 @@ MEANS = (
 def tick_time(agent: Agent, seed: int) -> float | None:
     """Median time of a control tick [µs] from Python, at 0.5 m/s; None if it falls before."""
     env = agent.env
-    assert isinstance(env, ResidualBalanceEnv)  # it walks
-    inner = env.controller
-    clocked = env.controller = Clocked(inner, env.robot)
-    try:
+    with clocked(env) as seconds:
         commands = [TimedCommand(0.5)]
         observation, _ = env.reset(seed=seed, options={"push": [], "command": commands})
         for k in range(round(2.0 * TICKS_FROM / env.config.policy_period)):
             if k == round(TICKS_FROM / env.config.policy_period):
-                clocked.seconds.clear()
+                seconds.clear()
             env.step_without_info(agent.act(observation))
             if env.fallen:
                 return None
-        return 1e6 * float(np.median(clocked.seconds))
-    finally:
-        env.controller = inner
+        return 1e6 * float(np.median(seconds))
 
 
 def _line(f: GaitFigures) -> str:

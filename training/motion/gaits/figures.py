@@ -12,47 +12,34 @@ from poise.training.pictures.figures.style import legend_below, look, saved_figu
 from poise.training.running.columns import COSTS, FOLLOWED, J50_MEAN, TICK, Figure, known
 from poise.training.running.tables import figure_table
 
-from .stance import POINTS, KneeMoment
+from .knee_moment import POINTS, KneeMoment
 
 
 @dataclass(frozen=True)
 class GaitFigures:
-    """A controller at one speed; means over its starts.
-
-    Attributes:
-        controller, speed: whose figures these are, and the command [m/s].
-        starts, falls: how many walks there were, and how many of them fell.
-        speed_ahead, speed_error_rms: reached, and the root mean square error of strides [m/s].
-        cost_of_transport, positive_cost_of_transport: see `Outcome`.
-        knee_mean, knee_peak: of the stance knee on one foot, |τ|/m [N·m/kg].
-        knee_stance: mean |τ|/m over whole stances, on both feet too [N·m/kg].
-        knee_rmse: root mean square difference of the mean curve over stance from the human one.
-        force_peak: mean of the stances' largest vertical force, in m g.
-        height_amplitude: of the CoM in a step, half of its way up and down [m].
-        step_length, step_time: [m], [s].
-        knee_curve: (51,) mean τ/m over stance, extension positive [N·m/kg]; empty without stances.
-        tick: median time of a control tick while it walks, from Python [µs].
-        j50: mean over directions and phases at 0.5 m/s [N·s]; None where it was not asked for.
-    """
+    """A controller at one speed; means over its starts."""
 
     controller: str
-    speed: float
-    starts: int
-    falls: int
-    speed_ahead: float | None
-    speed_error_rms: float | None
-    cost_of_transport: float | None
+    speed: float  #: the command [m/s]
+    starts: int  #: how many walks there were
+    falls: int  #: how many of them fell
+    speed_ahead: float | None  #: that is reached [m/s]
+    speed_error_rms: float | None  #: root mean square error of strides [m/s]
+    cost_of_transport: float | None  #: see `Outcome`, as the next three
     positive_cost_of_transport: float | None
-    knee_mean: float | None
+    knee_mean: float | None  #: of the stance knee on one foot, |τ|/m [N·m/kg]
     knee_peak: float | None
-    knee_stance: float | None
+    knee_stance: float | None  #: mean |τ|/m over whole stances, on both feet too [N·m/kg]
+    #: root mean square difference of the mean curve over stance from the human one [N·m/kg]
     knee_rmse: float | None
-    force_peak: float | None
-    height_amplitude: float | None
-    step_length: float | None
-    step_time: float | None
+    force_peak: float | None  #: mean of the stances' largest vertical force, in m g
+    height_amplitude: float | None  #: of the CoM in a step, half of its way up and down [m]
+    step_length: float | None  #: [m]
+    step_time: float | None  #: [s]
+    #: (51,) mean τ/m over stance, extension positive [N·m/kg]; empty without stances
     knee_curve: tuple[float, ...]
-    tick: float | None = None
+    tick: float | None = None  #: median time of a control tick while it walks, from Python [µs]
+    #: mean over directions and phases at 0.5 m/s [N·s]; None where it was not asked for
     j50: float | None = None
 
 

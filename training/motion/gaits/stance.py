@@ -1,19 +1,18 @@
-"""Stances: the knee's torque, the ground's force, the CoM's height; the human knee beside them."""
+"""Stances of a walk: the knee's torque, the ground's force, the CoM's height."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from poise.baselines.walking.models.legs import leg_arrays
-from poise.configs.files import resolve
-from poise.configs.schema import build, read_yaml
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.compiled.maths.runs import runs_of
 from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.trials.gait_record import knee_motors
 
-POINTS = 51  # of a curve over stance
+from .knee_moment import POINTS
+
 SHORTEST = 0.1  # [s] that a foot is down: a stance
 
 
@@ -29,17 +28,11 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Stances:
-    """The stances of a walk.
+    """The stances of a walk."""
 
-    Attributes:
-        knees: (n, 51) τ/m [N·m/kg] over each stance, extension positive.
-        peaks: (n,) the largest vertical force of the ground in each, in m g.
-        height_amplitude: half of the way of the CoM up and down in a step, mean [m]; None if there
-            is no step.
-    """
-
-    knees: np.ndarray
-    peaks: np.ndarray
+    knees: np.ndarray  #: (n, 51) τ/m [N·m/kg] over each stance, extension positive
+    peaks: np.ndarray  #: (n,) the largest vertical force of the ground in each, in m g
+    #: half of the way of the CoM up and down in a step, mean [m]; None if there is no step
     height_amplitude: float | None
 
 
@@ -80,49 +73,10 @@ class StanceRecord:
 
 def _spans(down: np.ndarray, time: np.ndarray, since: float) -> list[tuple[int, int]]:
     """First row and row after the last one of whole stances of one foot."""
-    edges = np.flatnonzero(np.diff(down.astype(int)))
-    landed = [int(row) + 1 for row in edges if not down[row] and time[row + 1] >= since]
-    lifted = np.array([row + 1 for row in edges if down[row]], dtype=int)
-    spans = [(row, int(lifted[lifted > row][0])) for row in landed if np.any(lifted > row)]
-    return [(a, b) for a, b in spans if time[b] - time[a] >= SHORTEST]
+    whole = [(a, b) for a, b in runs_of(down).tolist() if a > 0 and b < len(down)]
+    return [(a, b) for a, b in whole if time[a] >= since and time[b] - time[a] >= SHORTEST]
 
 
 def _resampled(values: np.ndarray) -> np.ndarray:
     """(51,) values over a stance whose time is normalised."""
     return np.interp(np.linspace(0.0, 1.0, POINTS), np.linspace(0.0, 1.0, len(values)), values)
-
-
-@dataclass(frozen=True)
-class KneeMoment:
-    """The knee's moment in the sagittal plane, extension positive, at points of stance.
-
-    Attributes:
-        source: where the figures are from.
-        stance: rising from 0 to 100 [%].
-        mean: [N·m/kg].
-        half_width: of the band [N·m/kg].
-    """
-
-    source: str
-    stance: tuple[float, ...]
-    mean: tuple[float, ...]
-    half_width: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        if not len(self.stance) == len(self.mean) == len(self.half_width) >= 2:
-            raise ValueError("stance: must be as long as mean and half_width, two points or more")
-        if self.stance[0] != 0.0 or self.stance[-1] != 100.0 or np.any(np.diff(self.stance) <= 0):
-            raise ValueError("stance: must rise from 0 to 100")
-        if min(self.half_width) < 0.0:
-            raise ValueError("half_width: must not be negative")
-
-    def curves(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and half width (51,) [N·m/kg] at every 2 % of stance, linear between the points."""
-        at = np.linspace(0.0, 100.0, POINTS)
-        return np.interp(at, self.stance, self.mean), np.interp(at, self.stance, self.half_width)
-
-
-def load_knee_moment(name: str | Path = "knee-moment") -> KneeMoment:
-    """A packaged band, or that of a YAML file; raises ConfigError for one that is not valid."""
-    path = resolve("human", name)
-    return build(KneeMoment, read_yaml(path), path)

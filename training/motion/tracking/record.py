@@ -23,26 +23,18 @@ ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an epi
 
 @dataclass(frozen=True)
 class TrackingFigures(StepFigures):
-    """How near a trial stayed to the motion; NaN where it fell at once.
+    """How near a trial stayed to the motion; NaN where it fell at once."""
 
-    Attributes:
-        joint_rms: root mean square of joint errors [rad].
-        body_error: mean distance of the bodies from where the motion has them, on the soles as
-            they stand [m] (MPKPE).
-        body_error_root: the same, relative to the root body [m].
-        body_error_last: `body_error` of the trial's last second [m].
-        com_error: mean distance of the CoM from the motion's [m].
-        sole_slide: largest distance of a sole from where it landed after the disturbed start [m].
-        motion_delay: by how much the motion is late at the end [s]; 0 unless it waits.
-    """
-
-    joint_rms: float
+    joint_rms: float  #: root mean square of joint errors [rad]
+    #: mean distance of the bodies from where the motion has them, on the soles as they stand [m]
+    #: (MPKPE)
     body_error: float
-    body_error_root: float
-    body_error_last: float
-    com_error: float
+    body_error_root: float  #: the same, relative to the root body [m]
+    body_error_last: float  #: `body_error` of the trial's last second [m]
+    com_error: float  #: mean distance of the CoM from the motion's [m]
+    #: largest distance of a sole from where it landed after the disturbed start [m]
     sole_slide: float
-    motion_delay: float
+    motion_delay: float  #: by how much the motion is late at the end [s]; 0 unless it waits
 
 
 class Tracking:

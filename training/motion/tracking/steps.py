@@ -11,20 +11,14 @@ from poise.baselines.motion.performing.motion_step import MotionStep
 
 @dataclass(frozen=True)
 class StepFigures:
-    """Errors of the feet while a motion is performed as its schedule says; NaN without steps.
+    """Errors of the feet while a motion is performed as its schedule says; NaN without steps."""
 
-    Attributes:
-        swing_error: root mean square of the distance of a sole in the air from the motion's [m].
-        placement_error: largest horizontal distance of a sole from where it is to be when it is
-            planted, at the first policy step on both feet [m].
-        support_slide: largest way of a planted sole from there until it lifts off [m].
-        interruptions: how often steps of the planner took over.
-    """
-
-    swing_error: float
+    swing_error: float  #: root mean square distance of a sole in the air from the motion's [m]
+    #: largest horizontal distance of a sole from where it is to be when it is planted, at the first
+    #: policy step on both feet [m]
     placement_error: float
-    support_slide: float
-    interruptions: float
+    support_slide: float  #: largest way of a planted sole from there until it lifts off [m]
+    interruptions: float  #: how often steps of the planner took over
 
 
 NONE = StepFigures(np.nan, np.nan, np.nan, np.nan)

@@ -18,11 +18,10 @@ from poise.training.benchmarking.statistics.rates import (
 
 
 @pytest.mark.parametrize("successes, trials", [(0, 10), (1, 10), (7, 10), (10, 10), (431, 1000)])
-@pytest.mark.parametrize("confidence", [0.8, 0.95])
-def test_wilson_matches_scipy(successes, trials, confidence):
+def test_wilson_matches_scipy(successes, trials):
     """The Wilson interval is scipy's."""
-    expected = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
-    ours = wilson_interval(successes, trials, confidence)
+    expected = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
+    ours = wilson_interval(successes, trials)
     np.testing.assert_allclose(ours, (expected.low, expected.high), atol=1e-12)
 
 
@@ -65,33 +64,23 @@ def test_wilson_refuses_impossible_counts(bad):
         wilson_interval(*bad)
 
 
-@pytest.mark.parametrize("confidence", [0.0, 1.0, 95])
-def test_confidence_must_be_a_probability(confidence):
-    """A confidence of 95 instead of 0.95 is an error."""
-    with pytest.raises(ValueError, match="confidence"):
-        wilson_interval(1, 2, confidence)
-
-
 @pytest.mark.parametrize("counts", [(0, 0), (6, 17), (17, 6), (5, 5), (0, 8), (40, 75), (15, 140)])
 def test_mcnemar_matches_the_binomial_test(counts):
     """The p-value is scipy's exact two-sided binomial test, for few and for many differences."""
     expected = stats.binomtest(counts[0], sum(counts), 0.5).pvalue if sum(counts) else 1.0
-    result = mcnemar(*counts)
-    assert result.p_value == pytest.approx(expected, rel=1e-9)
-    assert (result.only_a, result.only_b) == counts
-    assert "exact" in result.method
+    assert mcnemar(*counts) == pytest.approx(expected, rel=1e-9)
 
 
 def test_mcnemar_matches_statsmodels():
     """The p-value is statsmodels' exact McNemar test, whatever the trials that agree."""
     tables = pytest.importorskip("statsmodels.stats.contingency_tables")
     expected = tables.mcnemar([[100, 6], [17, 50]], exact=True).pvalue
-    assert mcnemar(6, 17).p_value == pytest.approx(expected, rel=1e-9)
+    assert mcnemar(6, 17) == pytest.approx(expected, rel=1e-9)
 
 
 def test_mcnemar_of_a_clear_winner_is_tiny_and_positive():
     """A thousand wins to one give a p-value near zero, not a rounding accident."""
-    assert 0 < mcnemar(1, 1000).p_value < 1e-200
+    assert 0 < mcnemar(1, 1000) < 1e-200
 
 
 def test_mcnemar_refuses_negative_counts():
@@ -120,7 +109,7 @@ def test_seed_aggregate_covers_the_true_mean():
     held = 0
     for k in range(200):
         scores = 5 + np.linspace(-1, 1, 4) + rng.normal(0, 1, size=(10, 4))
-        ci = seed_aggregate(scores, resamples=300, seed=k).interval
+        _, ci = seed_aggregate(scores, resamples=300, seed=k)
         held += ci.low <= 5 <= ci.high
     assert 0.88 <= held / 200 <= 0.99
 
@@ -128,17 +117,15 @@ def test_seed_aggregate_covers_the_true_mean():
 def test_seed_aggregate_resamples_within_each_task():
     """Tasks of different difficulty add no width: the bootstrap is stratified by task."""
     scores = np.tile([0.0, 10.0, 20.0, 30.0], (5, 1))
-    result = seed_aggregate(scores)
-    assert result.interval == (15.0, 15.0)
-    assert (result.iqm, result.seeds, result.tasks) == (15.0, 5, 4)
+    assert seed_aggregate(scores) == (15.0, (15.0, 15.0))
 
 
 def test_seed_aggregate_resamples_tasks_apart():
     """Each task draws its own seeds: errors of the seeds average out over tasks."""
     seeds = np.array([[-1.0], [0.0], [1.0]])
-    one = seed_aggregate(seeds)
-    many = seed_aggregate(np.tile(seeds, (1, 50)))
-    assert np.ptp(many.interval) < 0.5 * np.ptp(one.interval)
+    _, one = seed_aggregate(seeds)
+    _, many = seed_aggregate(np.tile(seeds, (1, 50)))
+    assert np.ptp(many) < 0.5 * np.ptp(one)
 
 
 def test_seed_aggregate_repeats_from_its_seed():
@@ -182,8 +169,5 @@ def test_poisson_matches_its_definition(count):
 
 
 def test_poisson_refuses_a_negative_count():
-    """As it refuses a confidence that is no probability."""
     with pytest.raises(ValueError, match="count must not be negative"):
         poisson_interval(-1)
-    with pytest.raises(ValueError, match="confidence"):
-        poisson_interval(1, 95.0)

@@ -148,7 +148,7 @@ def test_parts_are_played_one_after_the_other(limits: PushLimits) -> None:
         ({"randm": {}}, "randm: unknown field.*choices: .*random, sequence, quiet"),
         (
             {"kind": "random", "trials": 3},
-            "kind: a suite names its parts now: random: .trials: 3.*choices: .*random",
+            "kind: unknown field.*choices: .*random",
         ),
         ({"duration": 3.0}, "needs one part or more: envelope, grid"),
         ({"random": {"trials": 0}}, "random.trials.*at least 1"),
@@ -174,24 +174,6 @@ def test_an_unknown_suite_or_body_is_refused(limits: PushLimits) -> None:
         load_suite("rndom")
     with pytest.raises(ConfigError, match="tail.*torso"):
         Plan(Suite(body="tail", quiet=Quiet()), limits, 0, ["a"])
-
-
-@pytest.mark.parametrize(
-    ("text", "now"),
-    [
-        ("kind: random\ntrials: 200\npushes: {magnitude: [0.5, 1.6]}\nduration: 6.0\n",
-         "random: {trials: 200, pushes: {magnitude: [0.5, 1.6]}}"),
-        ("kind: other\n", "random: {trials: 200}"),
-        ("kind: []\n", "random: {trials: 200}"),
-    ],
-)  # fmt: skip
-def test_a_suite_of_the_old_form_says_the_new_one(tmp_path: Path, text: str, now: str) -> None:
-    """A part is what its `kind` was; what parts share stays beside it."""
-    path = tmp_path / "mine.yaml"
-    path.write_text(text)
-    with pytest.raises(ConfigError) as error:
-        load_suite(path)
-    assert str(error.value).startswith(f"{path}: kind: a suite names its parts now: {now} (choices")
 
 
 def test_levels_meet_the_same_starts_and_pushes(limits: PushLimits) -> None:

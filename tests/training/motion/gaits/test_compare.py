@@ -9,7 +9,8 @@ from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.trials.trial import Outcome
 from poise.training.cli.entry import main
 from poise.training.motion.gaits.compare import controller_of, figures_of
-from poise.training.motion.gaits.stance import KneeMoment, Stances
+from poise.training.motion.gaits.knee_moment import KneeMoment
+from poise.training.motion.gaits.stance import Stances
 from tests.support.evaluations import InProcess, write_suite
 
 BAND = KneeMoment("x", (0.0, 100.0), (0.2, 0.2), (0.1, 0.1))

@@ -1,10 +1,10 @@
-"""training/motion/gaits/stance.py: the band that knees are compared with."""
+"""training/motion/gaits/knee_moment.py: the band that knees are compared with."""
 
 import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.training.motion.gaits.stance import KneeMoment, load_knee_moment
+from poise.training.motion.gaits.knee_moment import KneeMoment, load_knee_moment
 
 
 def test_the_packaged_band_says_where_it_is_from():

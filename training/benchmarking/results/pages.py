@@ -1,0 +1,55 @@
+"""What the pages made of committed files summary.json have in common."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import jinja2
+
+from poise.configs.errors import ConfigError
+from poise.configs.texts import code, markdown_table, plain
+from poise.training.running.columns import NONE, Figure
+from poise.training.running.summary import Entry, Summary
+
+Table = tuple[Sequence[str], list[list[str]]]  # headings and rows, as `markdown_table` takes them
+
+
+def page_of(template: str, **values: object) -> str:
+    """The Markdown of a template of this room: `table`, `code`, `plain` and `commit` are known."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("poise.training.benchmarking.results", "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"code": code, "plain": plain, "commit": _commit}
+    return environment.get_template(template).render(table=markdown_table, code=code, **values)
+
+
+def check_alike(
+    summaries: Mapping[str, Summary], shared: Callable[[Summary], Mapping[str, object]]
+) -> None:
+    """Raise ConfigError for a result that does not share with the first what it is to."""
+    first, *_ = summaries
+    wanted = shared(summaries[first])
+    for source, summary in summaries.items():
+        for field, value in shared(summary).items():
+            if value != wanted[field]:
+                raise ConfigError(f"is not that of {first}", source=source, field=field)
+
+
+def direction_table(entries: Mapping[str, Entry], names: Iterable[str], figure: Figure) -> Table:
+    """A figure in every direction, of the controllers that were pushed."""
+    found = {name: {d["direction"]: d for d in entries[name].get("directions", ())}
+             for name in names}  # fmt: skip
+    angles = sorted({angle for each in found.values() for angle in each})
+    rows = [
+        [code(name), *(figure.text(own[a]) if a in own else NONE for a in angles)]
+        for name, own in found.items()
+        if own
+    ]
+    return ["controller", *(f"{angle:g}°" for angle in angles)], rows
+
+
+def _commit(summary: Summary) -> str:
+    """The commit that a result was played at."""
+    return code((summary["commit"] or "unknown")[:10])
