@@ -1,6 +1,6 @@
 """Where a robot has hips, knees, ankles, shoulders, elbows and hands: read off its model."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -9,6 +9,16 @@ from poise.envs.robots.robot import Robot
 
 LATERAL = 0.03  # [m] from the middle: the end of an arm is further
 ABOVE = 0.3  # [m] between the two points of a trunk without arms
+
+
+class Placed(Protocol):
+    """What has a place in a posture."""
+
+    def place(self, data: mujoco.MjData) -> np.ndarray:
+        """(3,) in the world [m]."""
+
+    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """(3, nv) of its velocity by the generalized velocity."""
 
 
 class Point(NamedTuple):
@@ -29,6 +39,21 @@ class Point(NamedTuple):
             mujoco.mj_jac(model, data, part, None, place, body)
             total += part
         return total / len(self.parts)
+
+
+class Difference(NamedTuple):
+    """One point as seen from another, in the world's axes."""
+
+    point: Placed
+    origin: Placed
+
+    def place(self, data: mujoco.MjData) -> np.ndarray:
+        """(3,) [m]."""
+        return self.point.place(data) - self.origin.place(data)
+
+    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """(3, nv)."""
+        return self.point.jacobian(model, data) - self.origin.jacobian(model, data)
 
 
 def sole_corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:

@@ -24,8 +24,8 @@ from poise.baselines.motion.retargeting.retarget import (
     retarget_to,
     targets_on,
 )
-from poise.baselines.motion.space_time.constraints.constraint import Constraint
-from poise.baselines.motion.space_time.constraints.reading import (
+from poise.baselines.motion.space_time.constraints.constraint import (
+    Constraint,
     check_constraints,
     read_constraints,
 )
@@ -34,7 +34,6 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .stance import standing_stance
-from .trajectory import jerk
 from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
@@ -201,9 +200,8 @@ def performable(
     made = retarget_to(given, clip, robot, smooth=smooth, lead=lead)
     from .asked import Asked  # mink is there: `retarget_to` has used it
     from .grid import by_trial
-    from .problem import Problem
+    from .problem import Problem, optimise
     from .quality import measure
-    from .solve import optimise
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted, made.clip.dt)
     if steps:
@@ -226,13 +224,9 @@ def performable(
 
 def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
     """A clip with steps, whose frames are not those of what was asked for: hands are left out."""
-    from .quality import Quality, measure_soles
+    from .quality import measure_soles
 
-    soles = measure_soles(scene)
-    quality = Quality(
-        soles.error, soles.skating, soles.skating_largest, max(made.penetration, soles.depth),
-        made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
-    )  # fmt: skip
+    quality = measure_soles(scene, made.penetration, made.limit_excess, made.direction_error)
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
                           made.begins, made.tempo, made.flight, made.bound)  # fmt: skip
 

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from poise.baselines.motion.retargeting.limbs import Limbs, Point, sole_corners
+from poise.baselines.motion.retargeting.limbs import (
+    Difference,
+    Limbs,
+    Placed,
+    Point,
+    sole_corners,
+)
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 SIDES = ("left", "right")
 COM = "com"
-
-
-class Placed(Protocol):
-    """What has a place in a posture."""
-
-    def place(self, data: mujoco.MjData) -> np.ndarray:
-        """(3,) in the world [m]."""
-
-    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """(3, nv) of its velocity by the generalized velocity."""
 
 
 class CentreOfMass(NamedTuple):
@@ -41,21 +37,6 @@ class CentreOfMass(NamedTuple):
         jacobian = np.empty((3, model.nv))
         mujoco.mj_jacSubtreeCom(model, data, jacobian, self.root)
         return jacobian
-
-
-class Difference(NamedTuple):
-    """One point as seen from another, in the world's axes."""
-
-    point: Placed
-    origin: Placed
-
-    def place(self, data: mujoco.MjData) -> np.ndarray:
-        """(3,) [m]."""
-        return self.point.place(data) - self.origin.place(data)
-
-    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """(3, nv)."""
-        return self.point.jacobian(model, data) - self.origin.jacobian(model, data)
 
 
 class Rows(NamedTuple):
