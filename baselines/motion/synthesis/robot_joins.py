@@ -12,15 +12,13 @@ from poise.baselines.balance.references.robot_clip import FEWEST, About, RobotCl
 from poise.baselines.balance.references.stances import why_not_home
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.feasibility.check import FeasibilityLimits
-from poise.baselines.motion.feasibility.edges import Attempt, End
+from poise.baselines.motion.feasibility.curve import End, JoinPart, Refused
 from poise.baselines.motion.feasibility.physical import (
     TIME_PRICE,
-    JoinPart,
     JoinRefused,
     direct_way,
     height_span,
     make_shaper,
-    part_of,
     pause,
     standing_end,
     ways_by_standing,
@@ -161,14 +159,13 @@ class RobotJoins:
 
     def _direct(self, shaper: Shaper, a: End, b: End) -> Way | str:
         found = direct_way(shaper, a, b, TIME_PRICE)
-        return found.reason if found.qpos is None else self._way(shaper, a, b, (found,))
+        return found.reason if isinstance(found, Refused) else self._way(shaper, a, b, (found,))
 
-    def _way(self, shaper: Shaper, a: End, b: End, found: tuple[Attempt, ...]) -> Way:
-        inner = pause(shaper, [attempt.qpos for attempt in found if attempt.qpos is not None])
-        joints = np.vstack([a.q, *inner, b.q])
+    def _way(self, shaper: Shaper, a: End, b: End, parts: tuple[JoinPart, ...]) -> Way:
+        joints = np.vstack([a.q, *pause(shaper, parts), b.q])
         qpos = np.array([shaper.planted.placed(q) for q in joints])
         clip = clip_of_robot(self.robot, qpos, shaper.dt, "physical")
-        return Way(clip, tuple(part_of(shaper, attempt) for attempt in found))
+        return Way(clip, parts)
 
     @cached_property
     def _first_shaper(self) -> Shaper:
