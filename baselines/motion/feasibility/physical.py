@@ -13,7 +13,7 @@ from poise.baselines.balance.references.robot_clip import RobotClip
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.robots.robot import Robot
 
-from .apart import Stretch, check_rates, in_one, stretch_at
+from .apart import check_rates, in_one, stretch_at
 from .check import FeasibilityLimits
 from .curve import Curve, End, JoinPart, Refused
 from .shape import Shaper
@@ -97,11 +97,13 @@ def physical_join(
     check_rates(before, after)
     steps = before.planted is not None or after.planted is not None
     enter = first * after.dt if steps else enter
-    left = stretch_at(robot, before, last, "leave")
-    entered = stretch_at(robot, after, first, "enter")
-    shaper = make_shaper(robot, before.dt, [left.motion, entered.motion], limits)
-    a, b = _sides(shaper, before, left, last, entered, enter)
-    way = way_between(shaper, a, b, time_price, through)
+    left, run = stretch_at(robot, before, last, "leave")
+    entered, onward = stretch_at(robot, after, first, "enter")
+    shaper = make_shaper(robot, before.dt, [left, entered], limits, time_price)
+    own_frames = before.qpos[run.start : last + 1, 7:]
+    a = shaper.end(left, (last - run.start) * before.dt, own_frames)
+    b = _entered(shaper, entered, enter - onward.start * before.dt)
+    way = way_between(shaper, a, b, through)
     if isinstance(way, str):
         raise JoinRefused(f"no way from {before.about.name!r} at {last * before.dt:.2f} s to "
                           f"{after.about.name!r} at {enter:.2f} s: {way}")  # fmt: skip
@@ -121,6 +123,7 @@ def make_shaper(
     dt: float,
     motions: Sequence[ReferenceMotion],
     limits: FeasibilityLimits | None = None,
+    time_price: float = TIME_PRICE,
 ) -> Shaper:
     """What makes joins between motions at a rate; the CoM stays about as low and high as theirs."""
     planted, legs = PlantedRobot(robot), PlantedLegs(robot)
@@ -128,7 +131,8 @@ def make_shaper(
     planted.at(robot.standing_qpos[7:], still, still)
     inertia = np.diag(planted.state.M) / robot.mass
     masses = np.concatenate([np.ones(3), inertia[3:6], inertia[6:][legs.others]])
-    return Shaper(planted, legs, limits or FeasibilityLimits(), dt, height_span(motions), masses)
+    limits = limits or FeasibilityLimits()
+    return Shaper(planted, legs, limits, dt, height_span(motions), masses, time_price)
 
 
 def height_span(motions: Sequence[ReferenceMotion]) -> tuple[float, float]:
@@ -137,17 +141,17 @@ def height_span(motions: Sequence[ReferenceMotion]) -> tuple[float, float]:
     return min(heights) - LOWER, max(heights) + HIGHER
 
 
-def cheapest(shaper: Shaper, a: End, b: End, time_price: float) -> JoinPart | Refused:
+def cheapest(shaper: Shaper, a: End, b: End) -> JoinPart | Refused:
     """The possible way of least K + λ D; if none is, the duration that lacks least."""
     best, nearest, least = None, Refused(""), np.inf
-    for bound, count in sorted(_prices(shaper, a, b, time_price)):
+    for bound, count in sorted(_prices(shaper, a, b)):
         if bound >= least:
             break  # bends only add to K
         tried = shaper.attempt(a, b, count)
         if isinstance(tried, Refused):
             nearest = tried if not nearest.reason or tried.lacking < nearest.lacking else nearest
             continue
-        price = tried.coefficient + time_price * tried.duration
+        price = tried.coefficient + shaper.time_price * tried.duration
         if price < least:
             best, least = tried, price
     return best or nearest
@@ -172,36 +176,32 @@ def assembled(
     return RobotClip(replace(like.about, name=name), like.dt, qpos)
 
 
-def way_between(
-    shaper: Shaper, a: End, b: End, time_price: float, through: bool
-) -> tuple[JoinPart, ...] | str:
+def way_between(shaper: Shaper, a: End, b: End, through: bool) -> tuple[JoinPart, ...] | str:
     """One way, or two by standing if that is allowed; or why there is none."""
-    direct = direct_way(shaper, a, b, time_price)
+    direct = direct_way(shaper, a, b)
     if isinstance(direct, JoinPart):
         return (direct,)
     if not through:
         return direct.reason
-    ways = ways_by_standing(shaper, a, b, time_price)
+    ways = ways_by_standing(shaper, a, b)
     return f"{direct.reason}; {ways}" if isinstance(ways, str) else ways
 
 
-def direct_way(shaper: Shaper, a: End, b: End, time_price: float) -> JoinPart | Refused:
+def direct_way(shaper: Shaper, a: End, b: End) -> JoinPart | Refused:
     """The cheapest way from one end to the other, without the clips' accelerations if need be."""
-    direct = cheapest(shaper, a, b, time_price)
+    direct = cheapest(shaper, a, b)
     if isinstance(direct, Refused) and not (a.is_calm and b.is_calm):
         # a clip may be about to do what leads to nothing
-        calm = cheapest(shaper, a.calm, b.calm, time_price)
+        calm = cheapest(shaper, a.calm, b.calm)
         direct = calm if isinstance(calm, JoinPart) else direct
     return direct
 
 
-def ways_by_standing(
-    shaper: Shaper, a: End, b: End, time_price: float
-) -> tuple[JoinPart, ...] | str:
+def ways_by_standing(shaper: Shaper, a: End, b: End) -> tuple[JoinPart, ...] | str:
     """Two ways with standing between them; or why there are none."""
     standing, ways = standing_end(shaper), []
     for word, (start, goal) in zip(("to", "from"), pairwise((a, standing, b)), strict=True):
-        way = cheapest(shaper, start, goal, time_price)
+        way = cheapest(shaper, start, goal)
         if isinstance(way, Refused):
             return f"{word} standing: {way.reason}"
         ways.append(way)
@@ -215,27 +215,21 @@ def standing_end(shaper: Shaper) -> End:
     return shaper.end(load_motion("standing", robot), 0.0, frames)
 
 
-def _prices(shaper: Shaper, a: End, b: End, time_price: float) -> list[tuple[float, int]]:
+def _prices(shaper: Shaper, a: End, b: End) -> list[tuple[float, int]]:
     """K + λ D without bends, and the frames of D, for every duration that is tried."""
     lengths = np.geomspace(LEAST, MOST, LENGTHS) / shaper.dt
     prices = []
     for count in np.unique(np.maximum(2, np.round(lengths).astype(int))):
         curve = Curve.between(a.boundary, b.boundary, count * shaper.dt)
-        price = curve.energy(shaper.masses) + time_price * curve.duration
+        price = curve.energy(shaper.masses) + shaper.time_price * curve.duration
         prices.append((price, int(count)))
     return prices
 
 
-def _sides(
-    shaper: Shaper, before: RobotClip, left: Stretch, last: int, entered: Stretch, enter: float
-) -> tuple[End, End]:
-    """A at its frame `last` and B at `enter` [s], with the frames beside them."""
-    dt, first = shaper.dt, left.frames.start
-    a = shaper.end(left.motion, (last - first) * dt, before.qpos[first : last + 1, 7:])
-    enter -= entered.frames.start * dt
-    times = np.arange(enter, entered.motion.duration + 1e-9, dt)
-    frames = np.array([entered.motion.sample(time).q_ref for time in times])
-    return a, shaper.end(entered.motion, enter, frames)
+def _entered(shaper: Shaper, motion: ReferenceMotion, time: float) -> End:
+    """A motion from a time on [s]."""
+    times = np.arange(time, motion.duration + 1e-9, shaper.dt)
+    return shaper.end(motion, time, np.array([motion.sample(t).q_ref for t in times]))
 
 
 def _kept(clip: RobotClip, frames: slice) -> RobotClip:

@@ -35,6 +35,7 @@ class Shaper:
         dt: time between frames [s].
         heights: lowest and highest CoM that the join may have [m].
         masses: (n,) of the coordinates over the robot's: what K is weighted by.
+        time_price: λ of K + λ D, which is made least [m²/s⁴].
     """
 
     planted: PlantedRobot
@@ -43,6 +44,7 @@ class Shaper:
     dt: float
     heights: tuple[float, float]
     masses: np.ndarray
+    time_price: float
 
     def end(self, motion: ReferenceMotion, time: float, frames: np.ndarray) -> End:
         """The state of a motion at a time [s]; `frames` (m, nj) are those on its side."""

@@ -30,7 +30,7 @@ class Trajectory(NamedTuple):
         jacobians: (n, 6 nc, nv) of the soles, linear then angular, at their points.
         sole_points: (n, nc, 3) [m]; sole_axes: (n, nc, 3, 3); corners: (n, k, 3) of all [m].
         height: of the plane of the soles [m].
-        planted: (n, nc) bool, which soles the ground bears; None: all, always.
+        planted: (n, nc) bool, which soles bear.
     """
 
     times: np.ndarray
@@ -46,7 +46,7 @@ class Trajectory(NamedTuple):
     sole_axes: np.ndarray
     corners: np.ndarray
     height: float
-    planted: np.ndarray | None = None
+    planted: np.ndarray
 
     @property
     def zmp(self) -> np.ndarray:
@@ -174,7 +174,8 @@ def record(
                np.concatenate(corners))  # fmt: skip
         rows.append([np.array(part) for part in row])  # the state changes
     return Trajectory(times, *(np.array(column) for column in zip(*rows, strict=True)),
-                      height=planted.ground)  # fmt: skip
+                      height=planted.ground,
+                      planted=np.ones((len(times), len(robot.soles)), bool))  # fmt: skip
 
 
 def _least(rows: np.ndarray, values: np.ndarray) -> np.ndarray:

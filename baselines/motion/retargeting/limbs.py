@@ -88,7 +88,7 @@ def find_limbs(robot: Robot) -> Limbs:
     data.qpos[:] = robot.standing_qpos
     mujoco.mj_kinematics(model, data)
     feet = sorted(robot.soles, key=lambda sole: -data.xpos[sole.body_id][1])
-    chains = [_joints(model, sole.body_id) for sole in feet]
+    chains = [joints_to(model, sole.body_id) for sole in feet]
     points: dict[str, Point] = {}
     for side, own, other in zip(("left", "right"), chains, chains[::-1], strict=True):
         leg = [joint for joint in own if joint not in other]
@@ -108,7 +108,7 @@ def find_limbs(robot: Robot) -> Limbs:
     return Limbs(points, at, float(np.mean(lengths)))
 
 
-def _joints(model: mujoco.MjModel, body: int) -> list[int]:
+def joints_to(model: mujoco.MjModel, body: int) -> list[int]:
     """The joints between the root and a body, from the root on; without the free joint."""
     found: list[int] = []
     while body:
@@ -153,7 +153,7 @@ def _arm(model: mujoco.MjModel, data: mujoco.MjData, legs: set[int], sign: int) 
         chain
         for joint in range(1, model.njnt)
         if joint not in legs and sign * data.xpos[model.jnt_bodyid[joint]][1] > LATERAL
-        for chain in [_joints(model, int(model.jnt_bodyid[joint]))]
+        for chain in [joints_to(model, int(model.jnt_bodyid[joint]))]
         if not legs & set(chain[-2:])
     ]
     return max(chains, key=len, default=[])

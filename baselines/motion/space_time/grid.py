@@ -13,7 +13,7 @@ from poise.configs.errors import ConfigError
 
 from .asked import Asked
 from .problem import MARGIN
-from .stance import Stance, motions, plant
+from .stance import motions, plant
 
 EVERY = 0.1  # [s] between keyframes
 STEPS = 5  # values of each parameter; fewer where that makes too many trials
@@ -24,7 +24,7 @@ FAR = 0.05  # [m, rad] an excess whose coefficient is one half
 SOLE, NEAR = 1e-3, 1e-3  # [m] soles off their places, links too near: still satisfied
 
 
-def by_trial(scene: Scene, asked: Asked, stance: Stance, constraints: Sequence[Constraint]) -> None:
+def by_trial(scene: Scene, asked: Asked, constraints: Sequence[Constraint]) -> None:
     """Move the postures of a scene so that as many constraints hold as trials in steps find.
 
     Every keyframe by itself: each constraint that holds then has an operation with a parameter s,
@@ -46,7 +46,7 @@ def by_trial(scene: Scene, asked: Asked, stance: Stance, constraints: Sequence[C
         if not here:
             continue
         before = part.qpos[key].copy()
-        found = _best(part, asked, stance, here, key)
+        found = _best(part, asked, here, key)
         part.qpos[key] = found
         part.move(part.qpos)
         mujoco.mj_differentiatePos(scene.model, deltas[key], 1.0, before, found)
@@ -58,12 +58,10 @@ def by_trial(scene: Scene, asked: Asked, stance: Stance, constraints: Sequence[C
     for _ in range(ROUNDS):  # planting moves joints, too
         scene.qpos[moved, 7:] = np.clip(scene.qpos[moved, 7:], low, high)
         scene.move(scene.qpos)
-        plant(scene, stance, moved)
+        plant(scene, moved)
 
 
-def _best(
-    part: Scene, asked: Asked, stance: Stance, constraints: Sequence[Constraint], key: int
-) -> np.ndarray:
+def _best(part: Scene, asked: Asked, constraints: Sequence[Constraint], key: int) -> np.ndarray:
     """The posture (nq,) of a keyframe that satisfies most."""
     steps = min(STEPS, int(MOST ** (1.0 / len(constraints)) + 1e-9))
     if steps < 2:
@@ -75,16 +73,14 @@ def _best(
     for shares in sorted(values, key=sum):
         part.qpos[key] = begin
         part.move(part.qpos)
-        _operate(part, stance, constraints, key, np.array(shares))
+        _operate(part, constraints, key, np.array(shares))
         found = _score(part, asked, constraints, key)
         if found > score:
             best, score = part.qpos[key].copy(), found
     return best
 
 
-def _operate(
-    part: Scene, stance: Stance, constraints: Sequence[Constraint], key: int, shares: np.ndarray
-) -> None:
+def _operate(part: Scene, constraints: Sequence[Constraint], key: int, shares: np.ndarray) -> None:
     """Move a keyframe by shares of what its constraints miss, within the joint limits."""
     if not shares.any():
         return
@@ -101,13 +97,13 @@ def _operate(
         if not gaps:
             return
         gap, derivative = np.concatenate(gaps), np.concatenate(jacobians)
-        ways = motions(part, stance, key)
+        ways = motions(part, key)
         J = derivative[gap != 0.0] @ ways.free
         step = J.T @ np.linalg.solve(J @ J.T + DAMPING * np.eye(len(J)), gap[gap != 0.0])
         part.displace(key, ways.free @ step)
         part.qpos[key, 7:] = np.clip(part.qpos[key, 7:], low, high)
         part.move(part.qpos)
-        plant(part, stance, np.array([key]))
+        plant(part, np.array([key]))
         rows = [list(each.rows(part, [key])) for each in constraints]
 
 

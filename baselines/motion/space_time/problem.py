@@ -12,7 +12,7 @@ from poise.configs.errors import PoiseError
 
 from .asked import Asked
 from .program import Penalised, Quadratic, solve_program
-from .stance import Motions, Stance, motions, plant
+from .stance import Motions, motions, plant
 from .trajectory import coordinate_derivative, coordinates, third_difference
 
 PENALTY = 100.0  # of what a user's constraint lacks [1/m, 1/rad], times its weight
@@ -53,11 +53,9 @@ class Problem:
     """
 
     def __init__(
-        self, scene: Scene, asked: Asked, stance: Stance, constraints: Sequence[Constraint],
-        crossover: float,
-    ):  # fmt: skip
-        self.scene, self.asked, self.stance = scene, asked, stance
-        self.constraints = constraints
+        self, scene: Scene, asked: Asked, constraints: Sequence[Constraint], crossover: float
+    ):
+        self.scene, self.asked, self.constraints = scene, asked, constraints
         nv = scene.model.nv
         third = third_difference(len(scene), scene.dt)
         self.third = sparse.kron(third, sparse.identity(nv), format="csr")
@@ -88,7 +86,7 @@ class Problem:
             errors.append(self.asked.errors(scene, frame))
             jacobians.append(sparse.csr_matrix(self.asked.tasks.jacobian()))
             if 0 < frame < len(scene) - 1:
-                moves.append(motions(scene, self.stance, frame))
+                moves.append(motions(scene, frame))
                 penalised += [Penalised(each, HARD) for each in self.asked.clearance(scene, frame)]
             else:
                 moves.append(Motions(np.zeros(nv), np.zeros((nv, 0))))
@@ -146,7 +144,7 @@ def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = No
         for tried in SHARES:
             for frame in problem.inner.tolist():
                 scene.displace(frame, tried * step[frame])
-            plant(scene, problem.stance, problem.inner)
+            plant(scene, problem.inner)
             found = problem.cost()
             if found.whole < cost.whole:
                 share = tried

@@ -33,7 +33,6 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .stance import standing_stance
 from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
@@ -206,15 +205,15 @@ def performable(
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted, made.clip.dt)
     if steps:
         return _stepped(made, scene)
-    stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
+    asked = Asked(scene, targets, wanted)
     spent, begun = made.time_per_frame, time.thread_time()
     if chosen == "spacetime":
-        optimise(Problem(scene, asked, stance, wanted, CROSSOVER),
+        optimise(Problem(scene, asked, wanted, CROSSOVER),
                  None if progress is None else lambda i, cost: progress(
                      f"program {i}: tasks {cost.tasks:.3f}, third derivative {cost.rough:.3f}, "
                      f"constraints {cost.lacking:.3f}"))  # fmt: skip
     elif chosen == "grid":
-        by_trial(scene, asked, stance, wanted)
+        by_trial(scene, asked, wanted)
     if chosen != "frame":
         spent = (time.thread_time() - begun) / len(scene)
     done = replace(made.clip, qpos=scene.qpos)

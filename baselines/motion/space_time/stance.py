@@ -1,4 +1,4 @@
-"""Where soles are planted, and how postures move that keep them there."""
+"""How postures move whose soles stay where the robot stands, and how they are led back there."""
 
 from typing import NamedTuple
 
@@ -10,18 +10,6 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 RANK = 1e-6  # of the largest singular value: smaller ones are rounding
 SINGULAR = 0.02  # as in the solver of single frames: what hardly moves a foot is damped
 NEWTON, CLOSE = 6, 1e-10  # steps to planted soles at most, and the error [m, rad] that ends them
-
-
-class Stance(NamedTuple):
-    """Where the feet are while both soles are planted, by the order of the robot's soles.
-
-    Attributes:
-        places: (2, 3) of the feet's bodies [m].
-        axes: (2, 4) their orientations, wxyz.
-    """
-
-    places: np.ndarray
-    axes: np.ndarray
 
 
 class Motions(NamedTuple):
@@ -37,20 +25,13 @@ class Motions(NamedTuple):
     free: np.ndarray
 
 
-def standing_stance(scene: Scene) -> Stance:
-    """Both soles where the robot stands."""
-    data = scene.see(scene.robot.standing_qpos)
-    bodies = [sole.body_id for sole in scene.robot.soles]
-    return Stance(data.xpos[bodies], data.xquat[bodies])
-
-
-def motions(scene: Scene, stance: Stance, frame: int) -> Motions:
+def motions(scene: Scene, frame: int) -> Motions:
     """The displacements that keep both soles of a frame where they are planted.
 
     With the rows A = U S Vᵀ of both feet, N is the complement of V, and δ₀ = −V S/(S² + λ²) Uᵀ e:
     where legs hardly move a foot (ankles of one axis) an error asks for no large motion.
     """
-    error, rows = sole_error(scene, scene.at(frame), stance)
+    error, rows = sole_error(scene, frame)
     left, values, right = np.linalg.svd(rows)
     rank = int((values > RANK * values[0]).sum())
     gains = values[:rank] / (values[:rank] ** 2 + SINGULAR**2)
@@ -58,11 +39,11 @@ def motions(scene: Scene, stance: Stance, frame: int) -> Motions:
     return Motions(given, right[rank:].T)
 
 
-def sole_error(scene: Scene, data: mujoco.MjData, stance: Stance) -> tuple[np.ndarray, np.ndarray]:
-    """Errors (12,) of the feet in a posture [m, rad], and their derivative (12, nv)."""
-    errors: list[np.ndarray] = []
+def sole_error(scene: Scene, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (12,) of the feet in a frame [m, rad], and their derivative (12, nv)."""
+    data, errors = scene.at(frame), list[np.ndarray]()
     rows: list[np.ndarray] = []
-    for sole, place, axes in zip(scene.robot.soles, stance.places, stance.axes, strict=True):
+    for sole, place, axes in zip(scene.robot.soles, *scene.standing_feet, strict=True):
         turn, back = np.empty(4), np.empty(4)
         mujoco.mju_negQuat(back, axes)
         mujoco.mju_mulQuat(turn, data.xquat[sole.body_id], back)
@@ -74,11 +55,11 @@ def sole_error(scene: Scene, data: mujoco.MjData, stance: Stance) -> tuple[np.nd
     return np.concatenate(errors), np.concatenate(rows)
 
 
-def plant(scene: Scene, stance: Stance, frames: np.ndarray) -> None:
+def plant(scene: Scene, frames: np.ndarray) -> None:
     """Lead the soles of some frames (k,) to their places, by the shortest displacements."""
     for frame in frames.tolist():
         for _ in range(NEWTON):
-            given = motions(scene, stance, frame).given
+            given = motions(scene, frame).given
             if np.abs(given).max() < CLOSE:
                 break
             scene.displace(frame, given)

@@ -74,6 +74,8 @@ class Scene:
         planted: (F, 2) by the order of the robot's soles.
         planted_corners: (F, 2, k, 3) where their corners are to be while planted [m]: where the
             robot stands, unless others are set. A sole of fewer corners has its last one again.
+        standing_feet: (2, 3) places [m] and (2, 4) orientations, wxyz, of the feet's bodies as the
+            robot stands.
         sides: the index of the left and the right sole.
     """
 
@@ -89,6 +91,8 @@ class Scene:
         self.duration = float(self.times[-1 - before])
         self._at = -1
         self.see(robot.standing_qpos)
+        feet = [sole.body_id for sole in robot.soles]
+        self.standing_feet = self.data.xpos[feet], self.data.xquat[feet]
         order = np.argsort([-self.data.xpos[sole.body_id][1] for sole in robot.soles])
         self.sides = dict(zip(SIDES, order.tolist(), strict=True))
         padded = np.array([self.padded_corners(i) for i in range(len(robot.soles))])
