@@ -173,9 +173,9 @@ def record(
         row = (s.qpos, s.qvel, vdot, s.com, com_acc, wrench, motors, s.J, s.sole_point, s.sole_axes,
                np.concatenate(corners))  # fmt: skip
         rows.append([np.array(part) for part in row])  # the state changes
-    return Trajectory(times, *(np.array(column) for column in zip(*rows, strict=True)),
-                      height=planted.ground,
-                      planted=np.ones((len(times), len(robot.soles)), bool))  # fmt: skip
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    bear = np.ones((len(times), len(robot.soles)), bool)
+    return Trajectory._make([times, *columns, planted.ground, bear])
 
 
 def _least(rows: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ def find_leaps(clip: Clip) -> list[Leap]:
     """
     planted = measure_contacts(clip).planted
     found = []
-    for a, last in stances_of(~planted.any(axis=1)):
+    for a, last in stances_of(np.asarray(~planted.any(axis=1))):
         b = last + 1
         if (b - a) * clip.dt <= FLIGHT:
             continue
