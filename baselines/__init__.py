@@ -58,8 +58,11 @@ if TYPE_CHECKING:
     from poise.baselines.environments.stepping import ResidualStepEnv
     from poise.baselines.environments.walking import ResidualWalkEnv
     from poise.baselines.environments.whole import ResidualWholeEnv
-    from poise.baselines.motion.retargeting.inverse_kinematics.goals import IkGoal
-    from poise.baselines.motion.retargeting.inverse_kinematics.options import IkOptions, IkResult
+    from poise.baselines.motion.retargeting.inverse_kinematics.goals import (
+        IkGoal,
+        IkOptions,
+        IkResult,
+    )
     from poise.baselines.motion.retargeting.inverse_kinematics.prior import PosePrior
     from poise.baselines.motion.retargeting.inverse_kinematics.solve import (
         InverseKinematics,

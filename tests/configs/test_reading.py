@@ -19,7 +19,7 @@ import yaml
 
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.environments.guard.config import guard_config
-from poise.baselines.motion.space_time.constraints.reading import read_constraints
+from poise.baselines.motion.space_time.constraints.constraint import read_constraints
 from poise.baselines.registry import controller_config
 from poise.configs.archives import MEMBERS, UNPACKED_BYTES, Archive, read_arrays
 from poise.configs.errors import ConfigError, PoiseError, shown

@@ -17,7 +17,7 @@ from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.robot_clip import About, RobotClip, write_robot_clip
 from poise.baselines.motion.graphs.motion_graph import read_graph, write_graph
 from poise.baselines.motion.retargeting.performed import load_clip
-from poise.baselines.motion.space_time.constraints.reading import read_constraints
+from poise.baselines.motion.space_time.constraints.constraint import read_constraints
 from poise.baselines.motion.synthesis.scripts.parser import read_script
 from poise.configs.files import packaged_folder
 from poise.configs.reading import read_yaml

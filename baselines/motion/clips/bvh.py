@@ -76,8 +76,8 @@ def read_bvh(
     posed = rigid(rooted_at_hips(whole, known if legs else {}), source)
     raw, places, turns = posed.skeleton, posed.root, posed.turns
     axes = _axes(raw, places, turns, unit, up, forward, source)
-    skeleton = Skeleton(raw.names, raw.parents, axes.places(raw.offsets), raw.end_parents,
-                        axes.places(raw.end_offsets), raw.orders, raw.known)  # fmt: skip
+    skeleton = replace(raw, offsets=axes.places(raw.offsets),
+                       end_offsets=axes.places(raw.end_offsets))  # fmt: skip
     clip = Clip(path.stem, skeleton, text.dt, axes.places(places), axes.turns(turns))
     return BvhFile(_begun(clip), axes)
 

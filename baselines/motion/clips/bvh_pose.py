@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from poise.configs.errors import ConfigError, shown
 
 from .bvh_text import BvhText
-from .roles import way_up
-from .rotations import angle_between, from_scipy, inverse, multiply, rotate
+from .rotations import IDENTITY, angle_between, from_scipy, inverse, multiply, rotate
 from .skeleton import Skeleton
 
 RIGID = 0.02  # of the skeleton's size: by which a joint may move on its parent
@@ -79,45 +78,41 @@ def rooted_at_hips(posed: Posed, roles: dict[str, int]) -> Posed:
     above moves the new root. Where they only turn the skeleton, its rest pose is turned, too.
     """
     old = posed.skeleton
-    ways = [way_up(old.parents, joint) for joint in roles.values()]
+    ways = [old.way_up(joint) for joint in roles.values()]
     shared = [joint for joint in ways[0] if all(joint in way for way in ways)] if ways else []
     # the joint on which all that have roles hang
     top = shared[0] if shared else _first_branch(old.parents)
     if top == 0:
-        return _kept(posed, np.arange(len(old.names)), posed.root, posed.turns, old.offsets, roles)
+        return _kept(posed, np.arange(len(old.names)), roles)
     places, turns = old.global_pose(posed.root, posed.turns, posed.shifts)
     above = turns[:, int(old.parents[top])]
     still = float(angle_between(above, above[:1]).max()) < STILL
-    rest = above[0] if still else np.array([1.0, 0.0, 0.0, 0.0])
+    rest = above[0] if still else IDENTITY
     local = multiply(multiply(rest, posed.turns), inverse(rest))
     local[:, top] = multiply(turns[:, top], inverse(rest))
-    kept = [joint for joint in range(len(old.parents)) if top in way_up(old.parents, joint)]
-    moved = replace(posed, shifts=rotate(rest, posed.shifts))
-    return _kept(
-        moved, np.array(kept), places[:, top], local, rotate(rest, old.offsets), roles, rest
-    )
+    kept = [joint for joint in range(len(old.parents)) if top in old.way_up(joint)]
+    turned = replace(old, offsets=rotate(rest, old.offsets),
+                     end_offsets=rotate(rest, old.end_offsets))  # fmt: skip
+    moved = Posed(turned, places[:, top], local, rotate(rest, posed.shifts))
+    return _kept(moved, np.array(kept), roles)
 
 
-def _kept(
-    posed: Posed, kept: np.ndarray, root: np.ndarray, turns: np.ndarray, offsets: np.ndarray,
-    roles: dict[str, int], rest: np.ndarray | None = None,
-) -> Posed:  # fmt: skip
+def _kept(posed: Posed, kept: np.ndarray, roles: dict[str, int]) -> Posed:
     """The part of a skeleton whose joints are `kept`, the first of them its root."""
     old, index = posed.skeleton, {int(joint): i for i, joint in enumerate(kept)}
     ends = [i for i, joint in enumerate(old.end_parents) if int(joint) in index]
-    own = offsets[kept]
+    own = old.offsets[kept]
     own[0] *= kept[0] == 0  # that of a root that hung on another counts nothing
-    tips = old.end_offsets[ends] if rest is None else rotate(rest, old.end_offsets[ends])
     skeleton = Skeleton(
         tuple(old.names[joint] for joint in kept),
         np.array([index.get(int(old.parents[joint]), -1) for joint in kept]),
         own,
         np.array([index[int(old.end_parents[end])] for end in ends], int),
-        tips,
+        old.end_offsets[ends],
         tuple(old.orders[joint] for joint in kept),
         {role: index[joint] for role, joint in roles.items() if joint in index},
     )
-    return Posed(skeleton, root, turns[:, kept], posed.shifts[:, kept])
+    return Posed(skeleton, posed.root, posed.turns[:, kept], posed.shifts[:, kept])
 
 
 def rigid(posed: Posed, source: str) -> Posed:

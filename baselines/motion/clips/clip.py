@@ -10,7 +10,7 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 
-from .rotations import about_z, heading_angle, inverse, multiply, rotate, slerp
+from .rotations import IDENTITY, about_z, heading_angle, inverse, multiply, rotate, slerp
 from .skeleton import SIDES, Skeleton
 from .support import Support
 
@@ -186,7 +186,7 @@ class Clip:
         root = self.root + grown * (self.root[0] - self.root[-1])
         gap = multiply(inverse(self.rotations[-1]), self.rotations[0])
         whole = np.broadcast_to(gap, self.rotations.shape)
-        identity = np.broadcast_to([1.0, 0.0, 0.0, 0.0], whole.shape)
+        identity = np.broadcast_to(IDENTITY, whole.shape)
         rotations = multiply(self.rotations, slerp(identity, whole, grown))
         return replace(self, root=root, rotations=rotations)
 

@@ -79,6 +79,14 @@ def measure_contacts(clip: Clip) -> Contacts:
     )
 
 
+def longest_flight(planted: np.ndarray, dt: float) -> tuple[int, float]:
+    """First frame and duration [s] of the longest time without a planted foot; 0 s without any."""
+    free = np.flatnonzero(~planted.any(axis=1))
+    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
+    longest = max(runs, key=len)
+    return int(longest[0]) if len(longest) else 0, len(longest) * dt
+
+
 def over_ground(clip: Clip) -> Clip:
     """A clip that walks or runs where it is, as on a treadmill, goes on; others stay as they are.
 

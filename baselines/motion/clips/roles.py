@@ -39,14 +39,6 @@ _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|左|右|[^\W\d_a-zA-Z左�
 _WHOLE = frozenset(word for words in SIDED.values() for word in words)
 
 
-def way_up(parents: np.ndarray, joint: int) -> list[int]:
-    """A joint, its parent, and so on to the root."""
-    way = [joint]
-    while (joint := int(parents[joint])) >= 0:
-        way.append(joint)
-    return way
-
-
 def find_roles(names: Sequence[str]) -> dict[str, int]:
     """Role → index among `names`; of several names for a role the most certain one wins.
 
@@ -144,7 +136,10 @@ def structural_roles(
         places: (F, J, 3) of the joints in some frames.
         ends: (F, E, 3) of the end sites.
     """
-    limbs = sorted(_limbs(parents, offsets), key=lambda pair: len(way_up(parents, pair[0][0])))
+    depth = np.zeros(len(parents), int)
+    for joint in range(1, len(parents)):  # parents come first
+        depth[joint] = depth[parents[joint]] + 1
+    limbs = sorted(_limbs(parents, offsets), key=lambda pair: depth[pair[0][0]])
     if not limbs:
         return {}
     found = [_bones(chain, offsets, len(LEG)) for chain in limbs[0]]

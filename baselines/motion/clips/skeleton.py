@@ -1,17 +1,15 @@
-"""A skeleton: a tree of joints with constant offsets, its forward kinematics, and link groups:
-joints of any skeleton chosen by a rule, as a view of a data base is."""
+"""A skeleton: a tree of joints with constant offsets, and its forward kinematics."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from functools import cached_property
 
 import numpy as np
 
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError
 
-from .roles import ROLES, SIDES, find_roles, sided, way_up
+from .roles import ROLES, SIDES, find_roles, sided
 from .rotations import multiply, rotate
 
 
@@ -77,6 +75,13 @@ class Skeleton:
         """Role, such as ``knee_left``, → joint, as far as it is known or the names tell it."""
         return {**find_roles(self.names), **self.known}
 
+    def way_up(self, joint: int) -> list[int]:
+        """A joint, its parent, and so on to the root."""
+        way = [joint]
+        while (joint := int(self.parents[joint])) >= 0:
+            way.append(joint)
+        return way
+
     def same_as(self, other: Skeleton) -> bool:
         """True for the same names, parents and offsets, to a micrometre."""
         return (
@@ -120,72 +125,3 @@ class Skeleton:
                 total += float(np.linalg.norm(self.offsets[joint]))
                 joint = int(self.parents[joint])
         return total / len(SIDES)
-
-
-@dataclass(frozen=True)
-class LinkGroup:
-    """A rule that selects joints: all that one of its parts selects, less what `exclude` matches.
-
-    A joint is named by its name or by its role, such as ``shoulder_left``. Patterns have the
-    shell's wildcards and look at names in small letters.
-
-    Attributes:
-        include: patterns of names.
-        exclude: patterns of names that are left out.
-        below: this joint and all that hang on it, each.
-        between: two joints; those on the way from one to the other, both included.
-    """
-
-    include: tuple[str, ...] = ()
-    exclude: tuple[str, ...] = ()
-    below: tuple[str, ...] = ()
-    between: tuple[str, str] | None = None
-
-    def joints(self, skeleton: Skeleton) -> np.ndarray:
-        """The sorted indices of the joints that the rule selects in this skeleton.
-
-        Raises:
-            ConfigError: a joint or role that the skeleton lacks, or a rule that selects nothing.
-        """
-        names = [name.lower() for name in skeleton.names]
-        chosen = {i for i, name in enumerate(names) if _matches(name, self.include)}
-        for name in self.below:
-            top = _named(skeleton, name)
-            chosen |= {i for i in range(len(names)) if top in way_up(skeleton.parents, i)}
-        if self.between is not None:
-            chosen |= _way(skeleton, *(_named(skeleton, name) for name in self.between))
-        chosen = {i for i in chosen if not _matches(names[i], self.exclude)}
-        if not chosen:
-            raise ConfigError("selects no joint", field="group", choices=skeleton.names)
-        return np.array(sorted(chosen))
-
-
-#: groups by name, for any skeleton whose joints have roles
-GROUPS = {
-    "left_arm": LinkGroup(below=("shoulder_left",)),
-    "right_arm": LinkGroup(below=("shoulder_right",)),
-    "arms": LinkGroup(below=("shoulder_left", "shoulder_right")),
-    "left_leg": LinkGroup(below=("hip_left",)),
-    "right_leg": LinkGroup(below=("hip_right",)),
-    "legs": LinkGroup(below=("hip_left", "hip_right")),
-    "head": LinkGroup(below=("head",)),
-}
-
-
-def _matches(name: str, patterns: tuple[str, ...]) -> bool:
-    return any(fnmatchcase(name, pattern.lower()) for pattern in patterns)
-
-
-def _named(skeleton: Skeleton, name: str) -> int:
-    if name in skeleton.names:
-        return skeleton.names.index(name)
-    if name in skeleton.roles:
-        return skeleton.roles[name]
-    choices = (*skeleton.names, *(role for role in ROLES if role in skeleton.roles))
-    raise ConfigError(f"no joint is called {shown(name)}", field="group", choices=choices)
-
-
-def _way(skeleton: Skeleton, a: int, b: int) -> set[int]:
-    up_a, up_b = way_up(skeleton.parents, a), way_up(skeleton.parents, b)
-    meeting = next(joint for joint in up_a if joint in up_b)
-    return {*up_a[: up_a.index(meeting) + 1], *up_b[: up_b.index(meeting)]}

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,27 +22,18 @@ from poise.envs.robots.robot import Robot
 from .trajectory import PlantedRobot
 
 
-class Stretch(NamedTuple):
-    """The frames of a clip about one of them without a step between, as a motion in place.
-
-    Attributes:
-        motion: of these frames.
-        frames: which they are.
-    """
-
-    motion: ReferenceMotion
-    frames: slice
-
-
-def stretch_at(robot: Robot, clip: RobotClip, frame: int, field: str) -> Stretch:
-    """What of a clip can be joined at a frame: all of it if it has no steps.
+def stretch_at(
+    robot: Robot, clip: RobotClip, frame: int, field: str
+) -> tuple[ReferenceMotion, slice]:
+    """The frames about one without a step between, and as a motion in place: what can be joined
+    there. Of a clip without steps these are all.
 
     Raises ConfigError where a sole is in the air, or both do not stand as in standing for four
     frames.
     """
     name, time = clip.about.name, f"{frame * clip.dt:.2f} s"
     if clip.planted is None:
-        return Stretch(reference_from(clip, robot, name), slice(0, len(clip.qpos)))
+        return reference_from(clip, robot, name), slice(0, len(clip.qpos))
     if said := why_not_home(robot, clip.qpos[frame], clip.planted[frame]):
         raise ConfigError(f"at {time} {said}: no join is possible there", source=name, field=field)
     run = Support(clip.planted, home_frames(robot, clip.qpos, clip.planted)).run(frame)
@@ -52,8 +42,7 @@ def stretch_at(robot: Robot, clip: RobotClip, frame: int, field: str) -> Stretch
                           source=name, field=field)  # fmt: skip
     placed = PlantedRobot(robot).placed
     qpos = np.array([placed(q[7:]) for q in clip.qpos[run]])
-    motion = reference_from(RobotClip(clip.about, clip.dt, qpos), robot, name, rest=False)
-    return Stretch(motion, run)
+    return reference_from(RobotClip(clip.about, clip.dt, qpos), robot, name, rest=False), run
 
 
 def check_rates(before: RobotClip, after: RobotClip) -> None:

@@ -198,7 +198,7 @@ def judge(
 ) -> Feasibility:
     """A sampled trajectory against limits."""
     force, support = trajectory.wrench[:, :3], trajectory.support
-    if trajectory.planted is None:
+    if trajectory.planted.all():
         normals, offsets = half_planes(support)
         margin = (offsets - trajectory.zmp @ normals.T).min(axis=1)
         drift = np.linalg.norm(trajectory.corners - trajectory.corners[0], axis=2).max(axis=1)
@@ -229,10 +229,8 @@ def judge(
 def _reach(robot: Robot, path: Trajectory) -> np.ndarray:
     """(n, 2, 2) least and largest x and y of the planted soles [m]."""
     corners = path.corners[:, :, :2]
-    down = np.ones(corners.shape[:2], dtype=bool)
-    if path.planted is not None:
-        counts = [len(sole.polygon) for sole in robot.soles]
-        down = path.planted[:, np.repeat(np.arange(len(counts)), counts)]
+    counts = [len(sole.polygon) for sole in robot.soles]
+    down = path.planted[:, np.repeat(np.arange(len(counts)), counts)]
     low, high = (np.where(down[..., None], corners, away) for away in (np.inf, -np.inf))
     return np.stack([low.min(axis=1), high.max(axis=1)], axis=1)
 

@@ -1,14 +1,21 @@
-"""Curves from one state to another: of the fifth order, and bent by three knots."""
+"""Joins as curves from one end to another, of the fifth order and bent by three knots, and what
+came of them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
 
+from poise.baselines.motion.graphs.joining.states import quintic
+
+from .check import Feasibility
+
 KNOTS = (0.25, 0.5, 0.75)
 ORDER = 5
+CALM = 1e-9  # [m/s², rad/s²] below which an acceleration is the rounding of a posture that is held
 _PADDED = np.concatenate([np.zeros(ORDER + 1), KNOTS, np.ones(ORDER + 1)])
 _POLYNOMIAL = np.polynomial.polynomial
 
@@ -42,15 +49,10 @@ class Curve(NamedTuple):
     def between(cls, a: Boundary, b: Boundary, duration: float) -> Curve:
         """The curve without bends."""
         D, gap = duration, b.place - a.place
-        start, end = D * a.rate, D * b.rate
-        bend_a, bend_b = D**2 * a.acceleration, D**2 * b.acceleration
-        rows = [
-            a.place, start, 0.5 * bend_a,
-            10.0 * gap - 6.0 * start - 4.0 * end - 1.5 * bend_a + 0.5 * bend_b,
-            -15.0 * gap + 8.0 * start + 7.0 * end + 1.5 * bend_a - bend_b,
-            6.0 * gap - 3.0 * (start + end) + 0.5 * (bend_b - bend_a),
-        ]  # fmt: skip
-        return cls(np.array(rows), np.zeros((len(KNOTS), len(gap))), duration)
+        bends = D**2 * a.acceleration, D**2 * b.acceleration
+        coefficients = quintic(gap, D * a.rate, D * b.rate, *bends)
+        coefficients[0] = a.place
+        return cls(coefficients, np.zeros((len(KNOTS), len(gap))), duration)
 
     def at(self, s: np.ndarray, derivative: int = 0) -> np.ndarray:
         """(m, n) values, or derivatives by time, at shares s (m,) of the duration."""
@@ -65,14 +67,70 @@ class Curve(NamedTuple):
         return float(weights @ (self.at(s, 2) ** 2 @ masses) * self.duration)
 
 
+class End(NamedTuple):
+    """One side of a join: joints of its frames (m, nj) and the state next to the join."""
+
+    frames: np.ndarray
+    q: np.ndarray
+    boundary: Boundary
+    region: np.ndarray  # (k, 2) where the motors can bear the weight
+    own: Feasibility  # of the motion about the join, whether it is played or not
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether it has no acceleration, so that `calm` is no other end."""
+        return bool(np.abs(self.boundary.acceleration).max() < CALM)
+
+    @property
+    def calm(self) -> End:
+        """The same place and rate without acceleration."""
+        none = np.zeros_like(self.boundary.acceleration)
+        return self._replace(boundary=self.boundary._replace(acceleration=none))
+
+
+@dataclass(frozen=True, eq=False)
+class JoinPart:
+    """One way from state to state that is possible.
+
+    Attributes:
+        qpos: (n − 1, nq) of the frames between both ends.
+        curve: that they follow.
+        coefficient: K, the energy of its bending [m²/s³].
+        feasibility: of its samples, whose times count from its begin.
+    """
+
+    qpos: np.ndarray
+    curve: Curve
+    coefficient: float
+    feasibility: Feasibility
+
+    @property
+    def duration(self) -> float:
+        """D [s]."""
+        return self.curve.duration
+
+    @property
+    def bent(self) -> bool:
+        """Whether knots had to leave the curve of the fifth order."""
+        return bool(np.any(self.curve.bends))
+
+    @property
+    def calm(self) -> bool:
+        """Whether it begins and ends without the clips' accelerations."""
+        return not np.any(self.curve.coefficients[2])
+
+
+class Refused(NamedTuple):
+    """Why a duration is not possible, and how far it is from that, see `Feasibility.lacking`."""
+
+    reason: str
+    lacking: float = np.inf
+
+
 def bend_shapes(s: np.ndarray, derivative: int = 0) -> np.ndarray:
     """(m, 3) Nⱼ, or their derivatives by s."""
-    shapes = []
-    for j in range(len(KNOTS)):
-        one = np.zeros(len(_PADDED) - ORDER - 1)
-        one[3 + j] = 1.0
-        shapes.append(BSpline(_PADDED, one, ORDER)(s, derivative))
-    return np.array(shapes).T
+    inner = np.eye(len(_PADDED) - ORDER - 1)[:, 3:6]
+    return np.asarray(BSpline(_PADDED, inner, ORDER)(s, derivative))
 
 
 def jerk_matrix() -> np.ndarray:

@@ -13,10 +13,9 @@ from poise.baselines.balance.references.robot_clip import RobotClip
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.robots.robot import Robot
 
-from .apart import Stretch, check_rates, in_one, stretch_at
-from .check import Feasibility, FeasibilityLimits
-from .curve import Curve
-from .edges import Attempt, End
+from .apart import check_rates, in_one, stretch_at
+from .check import FeasibilityLimits
+from .curve import Curve, End, JoinPart, Refused
 from .shape import Shaper
 from .trajectory import PlantedRobot
 
@@ -28,25 +27,6 @@ STILL = 4  # frames of standing between two joins
 
 class JoinRefused(PoiseError):
     """There is no way between two motions that the robot can do; the text says why."""
-
-
-@dataclass(frozen=True, eq=False)
-class JoinPart:
-    """One way from state to state.
-
-    Attributes:
-        duration: D [s].
-        coefficient: K, the energy of its bending [m²/s³].
-        bent: whether knots had to leave the curve of the fifth order.
-        calm: whether it begins and ends without the clips' accelerations.
-        feasibility: of its samples, whose times count from its begin.
-    """
-
-    duration: float
-    coefficient: float
-    bent: bool
-    calm: bool
-    feasibility: Feasibility
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,25 +97,25 @@ def physical_join(
     check_rates(before, after)
     steps = before.planted is not None or after.planted is not None
     enter = first * after.dt if steps else enter
-    left = stretch_at(robot, before, last, "leave")
-    entered = stretch_at(robot, after, first, "enter")
-    shaper = make_shaper(robot, before.dt, [left.motion, entered.motion], limits)
-    a, b = _sides(shaper, before, left, last, entered, enter)
-    way = way_between(shaper, a, b, time_price, through)
+    left, run = stretch_at(robot, before, last, "leave")
+    entered, onward = stretch_at(robot, after, first, "enter")
+    shaper = make_shaper(robot, before.dt, [left, entered], limits, time_price)
+    own_frames = before.qpos[run.start : last + 1, 7:]
+    a = shaper.end(left, (last - run.start) * before.dt, own_frames)
+    b = _entered(shaper, entered, enter - onward.start * before.dt)
+    way = way_between(shaper, a, b, through)
     if isinstance(way, str):
         raise JoinRefused(f"no way from {before.about.name!r} at {last * before.dt:.2f} s to "
                           f"{after.about.name!r} at {enter:.2f} s: {way}")  # fmt: skip
-    made = [attempt.qpos for attempt in way if attempt.qpos is not None]
-    between = pause(shaper, made)
+    between = pause(shaper, way)
     name = f"{before.about.name}-{after.about.name}"
     if steps:
         kept = _kept(before, slice(0, last + 1)), _kept(after, slice(first, None))
         clip = in_one(shaper.planted, *kept, between, name)
     else:
         clip = assembled(shaper, before, name, [a.frames, *between, b.frames])
-    parts = tuple(part_of(shaper, attempt) for attempt in way)
     start, length = last * before.dt, (sum(map(len, between)) + 1) * before.dt
-    return PhysicalJoin(clip, start, enter, start, start + length, parts)
+    return PhysicalJoin(clip, start, enter, start, start + length, way)
 
 
 def make_shaper(
@@ -143,6 +123,7 @@ def make_shaper(
     dt: float,
     motions: Sequence[ReferenceMotion],
     limits: FeasibilityLimits | None = None,
+    time_price: float = TIME_PRICE,
 ) -> Shaper:
     """What makes joins between motions at a rate; the CoM stays about as low and high as theirs."""
     planted, legs = PlantedRobot(robot), PlantedLegs(robot)
@@ -150,7 +131,8 @@ def make_shaper(
     planted.at(robot.standing_qpos[7:], still, still)
     inertia = np.diag(planted.state.M) / robot.mass
     masses = np.concatenate([np.ones(3), inertia[3:6], inertia[6:][legs.others]])
-    return Shaper(planted, legs, limits or FeasibilityLimits(), dt, height_span(motions), masses)
+    limits = limits or FeasibilityLimits()
+    return Shaper(planted, legs, limits, dt, height_span(motions), masses, time_price)
 
 
 def height_span(motions: Sequence[ReferenceMotion]) -> tuple[float, float]:
@@ -159,28 +141,26 @@ def height_span(motions: Sequence[ReferenceMotion]) -> tuple[float, float]:
     return min(heights) - LOWER, max(heights) + HIGHER
 
 
-def cheapest(shaper: Shaper, a: End, b: End, time_price: float) -> Attempt:
-    """The possible way of least K + λ D; if none is, the attempt that lacks least."""
-    best, nearest, least = None, None, np.inf
-    for bound, count in sorted(_prices(shaper, a, b, time_price)):
+def cheapest(shaper: Shaper, a: End, b: End) -> JoinPart | Refused:
+    """The possible way of least K + λ D; if none is, the duration that lacks least."""
+    best, nearest, least = None, Refused(""), np.inf
+    for bound, count in sorted(_prices(shaper, a, b)):
         if bound >= least:
             break  # bends only add to K
         tried = shaper.attempt(a, b, count)
-        if tried.qpos is None:
-            nearest = tried if nearest is None or tried.lacking < nearest.lacking else nearest
+        if isinstance(tried, Refused):
+            nearest = tried if not nearest.reason or tried.lacking < nearest.lacking else nearest
             continue
-        price = tried.curve.energy(shaper.masses) + time_price * tried.curve.duration
+        price = tried.coefficient + shaper.time_price * tried.duration
         if price < least:
             best, least = tried, price
-    found = best or nearest
-    assert found is not None  # there are lengths
-    return found
+    return best or nearest
 
 
-def pause(shaper: Shaper, ways: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Joints of frames of ways (n, nq), with standing between each two."""
+def pause(shaper: Shaper, parts: Sequence[JoinPart]) -> list[np.ndarray]:
+    """Joints of the frames of ways, with standing between each two."""
     standing = np.tile(shaper.planted.robot.standing_qpos[7:], (STILL, 1))
-    between = [frames for way in ways for frames in (way[:, 7:], standing)]
+    between = [frames for part in parts for frames in (part.qpos[:, 7:], standing)]
     return between[:-1]
 
 
@@ -196,35 +176,33 @@ def assembled(
     return RobotClip(replace(like.about, name=name), like.dt, qpos)
 
 
-def way_between(
-    shaper: Shaper, a: End, b: End, time_price: float, through: bool
-) -> tuple[Attempt, ...] | str:
+def way_between(shaper: Shaper, a: End, b: End, through: bool) -> tuple[JoinPart, ...] | str:
     """One way, or two by standing if that is allowed; or why there is none."""
-    direct = direct_way(shaper, a, b, time_price)
-    if direct.qpos is not None or not through:
-        return (direct,) if direct.qpos is not None else direct.reason
-    ways = ways_by_standing(shaper, a, b, time_price)
+    direct = direct_way(shaper, a, b)
+    if isinstance(direct, JoinPart):
+        return (direct,)
+    if not through:
+        return direct.reason
+    ways = ways_by_standing(shaper, a, b)
     return f"{direct.reason}; {ways}" if isinstance(ways, str) else ways
 
 
-def direct_way(shaper: Shaper, a: End, b: End, time_price: float) -> Attempt:
+def direct_way(shaper: Shaper, a: End, b: End) -> JoinPart | Refused:
     """The cheapest way from one end to the other, without the clips' accelerations if need be."""
-    direct = cheapest(shaper, a, b, time_price)
-    if direct.qpos is None and not (a.is_calm and b.is_calm):
+    direct = cheapest(shaper, a, b)
+    if isinstance(direct, Refused) and not (a.is_calm and b.is_calm):
         # a clip may be about to do what leads to nothing
-        calm = cheapest(shaper, a.calm, b.calm, time_price)
-        direct = calm if calm.qpos is not None else direct
+        calm = cheapest(shaper, a.calm, b.calm)
+        direct = calm if isinstance(calm, JoinPart) else direct
     return direct
 
 
-def ways_by_standing(
-    shaper: Shaper, a: End, b: End, time_price: float
-) -> tuple[Attempt, ...] | str:
+def ways_by_standing(shaper: Shaper, a: End, b: End) -> tuple[JoinPart, ...] | str:
     """Two ways with standing between them; or why there are none."""
     standing, ways = standing_end(shaper), []
     for word, (start, goal) in zip(("to", "from"), pairwise((a, standing, b)), strict=True):
-        way = cheapest(shaper, start, goal, time_price)
-        if way.qpos is None:
+        way = cheapest(shaper, start, goal)
+        if isinstance(way, Refused):
             return f"{word} standing: {way.reason}"
         ways.append(way)
     return tuple(ways)
@@ -237,35 +215,21 @@ def standing_end(shaper: Shaper) -> End:
     return shaper.end(load_motion("standing", robot), 0.0, frames)
 
 
-def _prices(shaper: Shaper, a: End, b: End, time_price: float) -> list[tuple[float, int]]:
+def _prices(shaper: Shaper, a: End, b: End) -> list[tuple[float, int]]:
     """K + λ D without bends, and the frames of D, for every duration that is tried."""
     lengths = np.geomspace(LEAST, MOST, LENGTHS) / shaper.dt
     prices = []
     for count in np.unique(np.maximum(2, np.round(lengths).astype(int))):
         curve = Curve.between(a.boundary, b.boundary, count * shaper.dt)
-        price = curve.energy(shaper.masses) + time_price * curve.duration
+        price = curve.energy(shaper.masses) + shaper.time_price * curve.duration
         prices.append((price, int(count)))
     return prices
 
 
-def part_of(shaper: Shaper, way: Attempt) -> JoinPart:
-    """What is told of a way that is possible."""
-    assert way.feasibility is not None  # of a way that is possible
-    bent, calm = bool(np.any(way.curve.bends)), not np.any(way.curve.coefficients[2])
-    coefficient = way.curve.energy(shaper.masses)
-    return JoinPart(way.curve.duration, coefficient, bent, calm, way.feasibility)
-
-
-def _sides(
-    shaper: Shaper, before: RobotClip, left: Stretch, last: int, entered: Stretch, enter: float
-) -> tuple[End, End]:
-    """A at its frame `last` and B at `enter` [s], with the frames beside them."""
-    dt, first = shaper.dt, left.frames.start
-    a = shaper.end(left.motion, (last - first) * dt, before.qpos[first : last + 1, 7:])
-    enter -= entered.frames.start * dt
-    times = np.arange(enter, entered.motion.duration + 1e-9, dt)
-    frames = np.array([entered.motion.sample(time).q_ref for time in times])
-    return a, shaper.end(entered.motion, enter, frames)
+def _entered(shaper: Shaper, motion: ReferenceMotion, time: float) -> End:
+    """A motion from a time on [s]."""
+    times = np.arange(time, motion.duration + 1e-9, shaper.dt)
+    return shaper.end(motion, time, np.array([motion.sample(t).q_ref for t in times]))
 
 
 def _kept(clip: RobotClip, frames: slice) -> RobotClip:

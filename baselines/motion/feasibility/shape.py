@@ -11,8 +11,8 @@ from poise.baselines.solvers import QP, make_solver
 from poise.envs.compiled.maths.polygons import half_planes
 
 from .check import Feasibility, FeasibilityLimits, check_joints, judge
-from .curve import Boundary, Curve, bend_shapes, jerk_matrix
-from .edges import EDGE, Attempt, End, between_clips
+from .curve import Boundary, Curve, End, JoinPart, Refused, bend_shapes, jerk_matrix
+from .edges import EDGE, between_clips
 from .split import bearable_region
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
@@ -35,6 +35,7 @@ class Shaper:
         dt: time between frames [s].
         heights: lowest and highest CoM that the join may have [m].
         masses: (n,) of the coordinates over the robot's: what K is weighted by.
+        time_price: λ of K + λ D, which is made least [m²/s⁴].
     """
 
     planted: PlantedRobot
@@ -43,6 +44,7 @@ class Shaper:
     dt: float
     heights: tuple[float, float]
     masses: np.ndarray
+    time_price: float
 
     def end(self, motion: ReferenceMotion, time: float, frames: np.ndarray) -> End:
         """The state of a motion at a time [s]; `frames` (m, nj) are those on its side."""
@@ -59,31 +61,31 @@ class Shaper:
         own = check_joints(self.planted, joints_of(motion), times, self.limits)
         return End(frames, s.q_ref, state, region, own)
 
-    def attempt(self, a: End, b: End, count: int) -> Attempt:
+    def attempt(self, a: End, b: End, count: int) -> JoinPart | Refused:
         """The join that lasts `count` frames."""
         curve = Curve.between(a.boundary, b.boundary, count * self.dt)
         bends, stuck = self._bent_joints(curve)
         if stuck:
-            return Attempt(None, curve, None, stuck)
+            return Refused(stuck)
         curve = curve._replace(bends=bends)
         for _ in range(ROUNDS):
             qpos, slopes = self.frames(curve, a, count)
             if qpos is None:
-                return Attempt(None, curve, None, "the legs cannot reach the ground")
+                return Refused("the legs cannot reach the ground")
             judged, path = self._judged(a, b, qpos, COARSE)
             reason = between_clips(judged, a.own, b.own)
             if not reason:
                 judged, path = self._judged(a, b, qpos, FINE)
                 reason = between_clips(judged, a.own, b.own)
             if not reason:
-                return Attempt(qpos, curve, judged, "")
+                return JoinPart(qpos, curve, curve.energy(self.masses), judged)
             step, lacking = self._step(curve, qpos, slopes, judged, path, (a, b))
             if step is None or lacking > HOPELESS or np.abs(step).max() < 1e-7:
                 break
             bends = curve.bends.copy()
             bends[:, :MOVED] += step
             curve = curve._replace(bends=bends)
-        return Attempt(None, curve, judged, reason)
+        return Refused(reason, judged.lacking)
 
     def _bent_joints(self, curve: Curve) -> tuple[np.ndarray, str]:
         """Least bends (3, n) that keep the joints in range, each by itself; or what cannot."""

@@ -26,9 +26,8 @@ def split_wrench(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     unit, limit = robot.units.force, np.asarray(robot.torque_limit)
     G = wrench_sums(trajectory)
     B = unit * (trajectory.jacobians[:, :, robot.motor_dofs] / limit).transpose(0, 2, 1)
-    if trajectory.planted is not None:  # a sole in the air bears nothing
-        bears = np.repeat(trajectory.planted, 6, axis=1)[:, None]
-        G, B = G * bears, B * bears
+    bears = np.repeat(trajectory.planted, 6, axis=1)  # a sole in the air bears nothing
+    G, B = G * bears[:, None], B * bears[:, None]
     b, wanted = trajectory.motors / limit, trajectory.wrench / unit
     size = np.concatenate([np.append(np.ones(3), _lever(sole.polygon)) for sole in robot.soles])
     H = B.transpose(0, 2, 1) @ B + SUM * G.transpose(0, 2, 1) @ G + np.diag(LEAST / size**2)
@@ -37,8 +36,7 @@ def split_wrench(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     below = np.full(cones.shape[1], -np.inf), np.zeros(cones.shape[1])
     solver = make_solver("active-set")
     solved = [solver.solve(QP(H[k], g[k], cones[k], *below)).x for k in range(len(H))]
-    out = unit * np.array(solved).reshape(len(H), -1)
-    return out if trajectory.planted is None else out * np.repeat(trajectory.planted, 6, axis=1)
+    return unit * np.array(solved).reshape(len(H), -1) * bears
 
 
 def motor_torques(robot: Robot, trajectory: Trajectory) -> np.ndarray:

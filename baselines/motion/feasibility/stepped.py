@@ -49,7 +49,6 @@ def sample_stepped(planted: PlantedRobot, motion: ReferenceMotion, times: np.nda
 def margins(robot: Robot, path: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """(n,) distance of the ZMP to the edge of the hull of the planted soles, above 0 inside [m];
     (n,) how far a corner of one has moved since it was planted [m]."""
-    assert path.planted is not None
     counts = [len(sole.polygon) for sole in robot.soles]
     owner = np.repeat(np.arange(len(counts)), counts)
     margin, drift = np.empty(len(path.times)), np.zeros(len(path.times))

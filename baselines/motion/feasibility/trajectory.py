@@ -30,7 +30,7 @@ class Trajectory(NamedTuple):
         jacobians: (n, 6 nc, nv) of the soles, linear then angular, at their points.
         sole_points: (n, nc, 3) [m]; sole_axes: (n, nc, 3, 3); corners: (n, k, 3) of all [m].
         height: of the plane of the soles [m].
-        planted: (n, nc) bool, which soles the ground bears; None: all, always.
+        planted: (n, nc) bool, which soles bear.
     """
 
     times: np.ndarray
@@ -46,7 +46,7 @@ class Trajectory(NamedTuple):
     sole_axes: np.ndarray
     corners: np.ndarray
     height: float
-    planted: np.ndarray | None = None
+    planted: np.ndarray
 
     @property
     def zmp(self) -> np.ndarray:
@@ -161,32 +161,21 @@ def record(
     planted: PlantedRobot, times: np.ndarray, put: Callable[[float], np.ndarray]
 ) -> Trajectory:
     """The whole robot at `times` (n,) [s]: `put` puts it there, and returns its v̇ (nv,)."""
-    robot, n = planted.robot, len(times)
-    nv, nc = robot.model.nv, len(robot.soles)
-    motor = robot.motor_dofs
-    made = Trajectory(
-        np.asarray(times, dtype=float), np.empty((n, nv + 1)), np.empty((n, nv)),
-        np.empty((n, nv)), np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 6)),
-        np.empty((n, len(motor))), np.empty((n, 6 * nc, nv)), np.empty((n, nc, 3)),
-        np.empty((n, nc, 3, 3)),
-        np.empty((n, sum(len(sole.polygon) for sole in robot.soles), 3)),
-        float(planted._origin[2]),
-    )  # fmt: skip
-    for k, time in enumerate(made.times):
+    robot, s, rows = planted.robot, planted._state, []
+    times = np.asarray(times, dtype=float)
+    for time in times:
         vdot = put(time)
-        s = planted._state
-        made.qpos[k], made.qvel[k], made.qacc[k] = s.qpos, s.qvel, vdot
-        made.com[k] = s.com
-        made.wrench[k] = s.A @ vdot + s.A_bias
-        made.com_acc[k] = made.wrench[k, :3] / robot.mass - [0.0, 0.0, robot.units.gravity]
-        made.motors[k] = (s.M @ vdot + s.h)[motor]
-        made.jacobians[k], made.sole_points[k] = s.J, s.sole_point
-        made.sole_axes[k] = s.sole_axes
-        made.corners[k] = np.concatenate([
-            s.sole_point[i] + sole.polygon @ s.sole_axes[i, :, :2].T
-            for i, sole in enumerate(robot.soles)
-        ])  # fmt: skip
-    return made
+        wrench = s.A @ vdot + s.A_bias
+        com_acc = wrench[:3] / robot.mass - [0.0, 0.0, robot.units.gravity]
+        motors = (s.M @ vdot + s.h)[robot.motor_dofs]
+        corners = [s.sole_point[i] + sole.polygon @ s.sole_axes[i, :, :2].T
+                   for i, sole in enumerate(robot.soles)]  # fmt: skip
+        row = (s.qpos, s.qvel, vdot, s.com, com_acc, wrench, motors, s.J, s.sole_point, s.sole_axes,
+               np.concatenate(corners))  # fmt: skip
+        rows.append([np.array(part) for part in row])  # the state changes
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    bear = np.ones((len(times), len(robot.soles)), bool)
+    return Trajectory._make([times, *columns, planted.ground, bear])
 
 
 def _least(rows: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -1,19 +1,19 @@
 """Transitions between all pairs of frames of two clips, by the coefficient of a cubic join."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import product
 
 import numpy as np
 from scipy.ndimage import minimum_filter
 
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import measure_contacts
-from poise.baselines.motion.clips.rotations import about_z, inverse, log, multiply
-from poise.baselines.motion.graphs.joining.coefficient import best_duration, moved_shares
+from poise.baselines.motion.clips.rotations import inverse, log, multiply
+from poise.baselines.motion.graphs.joining.coefficient import best_duration
 from poise.baselines.motion.graphs.joining.states import minus
 from poise.configs.errors import ConfigError
 
+from .frames import Frames, frames_of
 from .motion_graph import (
     GraphClip,
     MotionGraph,
@@ -26,83 +26,10 @@ from .motion_graph import (
     transition_order,
 )
 
-SAMPLING = 1.0 / 15.0  # [s] between frames that are compared
 DURATIONS = 8  # that are tried where all pairs of frames are
 WHOLE = 2  # frames at either end of a clip in which it is neither left nor entered
 MOST_REFUSED = 40  # pairs that are tried before two clips are given up
 SAME = 1.0  # [s] by which a clip must jump in itself
-
-
-class Frames(NamedTuple):
-    """Frames of a clip as the coefficient sees them, each facing x over the origin.
-
-    Attributes:
-        name: of the clip.
-        times: (n,) [s].
-        heights: (n, 3) of the root, 0 but for z [m].
-        rotations: (n, J, 4).
-        rates: (n, 3 + 3J) [m/s, rad/s].
-        planted: (n, 2), or None where the feet are not known.
-        masses: (3 + 3J,) for the coefficient.
-        duration: of the clip [s].
-        joints: their names.
-        home: (n,) whether a clip with steps can be left or entered; None: always.
-    """
-
-    name: str
-    times: np.ndarray
-    heights: np.ndarray
-    rotations: np.ndarray
-    rates: np.ndarray
-    planted: np.ndarray | None
-    masses: np.ndarray
-    duration: float
-    joints: tuple[str, ...]
-    home: np.ndarray | None = None
-
-
-def frames_of(clip: Clip, sampling: float = SAMPLING, planted: bool | None = None) -> Frames:
-    """A clip's frames about `sampling` [s] apart, the first and the last among them.
-
-    `planted` says that both feet always stand, or do not; None measures it where feet are known. A
-    clip that knows its contacts has them.
-
-    Raises ConfigError if the skeleton's hips are not known by name.
-    """
-    stride = max(round(sampling / clip.dt), 1)
-    chosen = np.unique(np.append(np.arange(0, len(clip), stride), len(clip) - 1))
-    turn = np.array([about_z(-angle) for angle in clip.facing()])[chosen]
-    rotations, rates = clip.rotations[chosen].copy(), all_rates(clip)[chosen]
-    rotations[:, 0] = multiply(turn, rotations[:, 0])
-    cos, sin = np.cos(2 * np.arctan2(turn[:, 3], turn[:, 0])), 2 * turn[:, 0] * turn[:, 3]
-    x, y = rates[:, 0].copy(), rates[:, 1].copy()
-    rates[:, 0], rates[:, 1] = cos * x - sin * y, sin * x + cos * y
-    heights = clip.root[chosen] * np.array([0.0, 0.0, 1.0])
-    home = None if clip.support is None else clip.support.home[chosen]
-    return Frames(clip.name, clip.times[chosen], heights, rotations, rates,
-                  _planted(clip, chosen, planted), moved_shares(clip.skeleton), clip.duration,
-                  clip.skeleton.names, home)  # fmt: skip
-
-
-def all_rates(clip: Clip) -> np.ndarray:
-    """(F, 3 + 3J) rates in all frames, as `state_at` has them."""
-    steps = minus(clip.root[1:], clip.rotations[1:], clip.root[:-1], clip.rotations[:-1]) / clip.dt
-    rates = np.empty((len(clip), steps.shape[1]))
-    rates[1:-1] = 0.5 * (steps[1:] + steps[:-1])
-    bends = (steps[1] - steps[0], steps[-1] - steps[-2]) if len(steps) > 1 else (0.0, 0.0)
-    rates[0], rates[-1] = steps[0] - 0.5 * bends[0], steps[-1] + 0.5 * bends[1]
-    return rates
-
-
-def _planted(clip: Clip, chosen: np.ndarray, planted: bool | None) -> np.ndarray | None:
-    if clip.support is not None:
-        return clip.support.planted[chosen]
-    if planted is not None:
-        return np.full((len(chosen), 2), planted)
-    try:
-        return measure_contacts(clip).planted[chosen]
-    except ConfigError:  # feet that are not known by name
-        return None
 
 
 def transitions_between(
@@ -172,18 +99,7 @@ def make_graph(
     frames = {entry.name: frames_of(clip, planted=True if robot else None)._replace(name=entry.name)
               for entry, clip in clips}  # fmt: skip
     said = {(weight.before, weight.after): weight.weight for weight in weights}
-    transitions: list[Transition] = []
-    refused: list[tuple[str, str, str]] = []
-    for a, before in frames.items():
-        for b, after in frames.items():
-            if (a, b) in said and said[a, b] is None:
-                refused.append((a, b, "never, by the expert's weights"))
-                continue
-            found, reason = transitions_between(before, after, limits)
-            if not found and (a, b) in said:
-                found = [end_to_begin(before, after, limits)]
-            transitions += found
-            refused += [] if found else [(a, b, reason)]
+    transitions, refused = _compared(product(frames, frames), frames, limits, said)
     try:
         return MotionGraph(robot, limits, tuple(entry for entry, _ in clips), states or {},
                            tuple(weights), tuple(transitions), tuple(refused))  # fmt: skip
@@ -193,15 +109,31 @@ def make_graph(
 
 def with_clip(graph: MotionGraph, entry: GraphClip, frames: dict[str, Frames]) -> MotionGraph:
     """The graph with one more clip, of which `frames` has the frames as of all others."""
-    transitions, refused = list(graph.transitions), list(graph.refused)
-    for name in (*graph.names, entry.name):
-        for a, b in {(name, entry.name), (entry.name, name)}:
-            found, reason = transitions_between(frames[a], frames[b], graph.thresholds)
-            transitions += found
-            refused += [] if found else [(a, b, reason)]
-    transitions.sort(key=transition_order)
+    own = entry.name
+    pairs = [pair for name in graph.names for pair in ((name, own), (own, name))]
+    transitions, refused = _compared([*pairs, (own, own)], frames, graph.thresholds, {})
+    transitions = sorted([*graph.transitions, *transitions], key=transition_order)
     return replace(graph, clips=(*graph.clips, entry), transitions=tuple(transitions),
-                   refused=tuple(refused))  # fmt: skip
+                   refused=(*graph.refused, *refused))  # fmt: skip
+
+
+def _compared(
+    pairs: Iterable[tuple[str, str]], frames: Mapping[str, Frames], thresholds: Thresholds,
+    said: Mapping[tuple[str, str], float | None],
+) -> tuple[list[Transition], list[tuple[str, str, str]]]:  # fmt: skip
+    """The transitions of pairs of clips, and why others have none; `said` is of an expert."""
+    transitions: list[Transition] = []
+    refused: list[tuple[str, str, str]] = []
+    for a, b in pairs:
+        if (a, b) in said and said[a, b] is None:
+            refused.append((a, b, "never, by the expert's weights"))
+            continue
+        found, reason = transitions_between(frames[a], frames[b], thresholds)
+        if not found and (a, b) in said:
+            found = [end_to_begin(frames[a], frames[b], thresholds)]
+        transitions += found
+        refused += [] if found else [(a, b, reason)]
+    return transitions, refused
 
 
 def _prices(before: Frames, after: Frames, thresholds: Thresholds) -> np.ndarray:

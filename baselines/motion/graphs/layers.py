@@ -110,9 +110,9 @@ class Layers:
         moments, layer = self.moments, (2 * k + 1) * self.size
         inside = moments.clip[moments.plays[:, 0]] == moments.number(name)
         self._add(layer + moments.plays[inside], SHORT * self.price * moments.lasts[inside])
-        into = self._enters(k)
+        into = self._joins_of(k, 1)
         self._add_joins(into, layer - self.size, layer, self._skipped_before(k, into))
-        out = self._leaves(k)
+        out = self._joins_of(k, 0)
         if (arrow := self.task.arrows.get(k)) is not None:
             ends = [moments.at(arrow.before, arrow.leave), moments.at(arrow.after, 0.0)]
             self._add(np.array([[layer + ends[0], layer + 2 * self.size + ends[1]]]),
@@ -121,24 +121,18 @@ class Layers:
         skipped = self.price * (moments.lengths[name] - moments.time[moments.joins[out, 0]])
         self._add_joins(out, layer, layer + self.size, skipped)
         if k + 1 < len(self.task.actions):
-            both = np.intersect1d(out, self._enters(k + 1))
+            both = np.intersect1d(out, self._joins_of(k + 1, 1))
             cost = self.price * (moments.lengths[name] - moments.time[moments.joins[both, 0]])
             self._add_joins(both, layer, layer + 2 * self.size,
                             cost + self._skipped_before(k + 1, both))  # fmt: skip
 
-    def _enters(self, k: int) -> np.ndarray:
-        """The transitions into an action."""
+    def _joins_of(self, k: int, end: int) -> np.ndarray:
+        """The transitions into an action (`end` 1), early in it, or out of it (0), late in it."""
         moments, name = self.moments, self.task.actions[k]
-        there = moments.clip[moments.joins[:, 1]] == moments.number(name)
-        early = moments.time[moments.joins[:, 1]] <= earliest_part(moments.lengths[name])
-        return np.flatnonzero(there & early)
-
-    def _leaves(self, k: int) -> np.ndarray:
-        """The transitions out of an action."""
-        moments, name = self.moments, self.task.actions[k]
-        there = moments.clip[moments.joins[:, 0]] == moments.number(name)
-        late = moments.time[moments.joins[:, 0]] >= latest_part(moments.lengths[name])
-        return np.flatnonzero(there & late)
+        moment, length = moments.joins[:, end], moments.lengths[name]
+        time = moments.time[moment]
+        fits = time <= earliest_part(length) if end else time >= latest_part(length)
+        return np.flatnonzero((moments.clip[moment] == moments.number(name)) & fits)
 
     def _skipped_before(self, k: int, joins: np.ndarray) -> np.ndarray:
         return self.price * self.moments.time[self.moments.joins[joins, 1]]

@@ -8,6 +8,7 @@ import numpy as np
 from poise.baselines.balance.references.footing import COLUMNS, Footing
 from poise.baselines.balance.references.tempo import Pace
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick
+from poise.baselines.balance.stepping.planning.units import in_si
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block, Integer, Number
 from poise.envs.compiled.maths.pendulum import Units
@@ -52,21 +53,14 @@ class Performance(Block):
 
 
 def allocate_performance(
-    footing: Footing, pace: Pace, config: PerformConfig, units: Units, landing_speed: float
+    footing: Footing, pace: Pace, config: PerformConfig, units: Units
 ) -> Performance:
     """The performance of a motion by a robot with these units, before it begins."""
-    c, h, omega = config, units.height, units.omega
     made = Performance.allocate(
         knots=footing.knots, coeffs=footing.coeffs, switches=footing.switches,
         planted=footing.planted, pace=pace,
-        gain=float(c.gain),
-        margin=c.margin * h,
-        margin_both=c.margin_both * h,
-        rest_time=c.rest_time / omega,
-        stance_error=c.stance_error * h,
-        load_time=c.load_time / omega,
-        unload_time=c.unload_time / omega,
-        landing_speed=landing_speed * h * omega,
+        **in_si(Performance, config, units),
+        **in_si(Performance, config.swing, units),
     )  # fmt: skip
     made.clear()
     return made

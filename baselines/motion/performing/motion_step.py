@@ -53,8 +53,7 @@ class MotionStep(CaptureStep):
         self._perform_tick = self.performance = None
         if motion.footing is not None:
             self.performance = allocate_performance(
-                motion.footing, pace, self._perform_config, self.robot.units,
-                self._perform_config.swing.landing_speed,
+                motion.footing, pace, self._perform_config, self.robot.units
             )  # fmt: skip
 
     @property

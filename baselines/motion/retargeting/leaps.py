@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import BPoly
 from scipy.spatial.transform import Rotation
 
-from poise.baselines.balance.references.footing import unwound
+from poise.baselines.balance.references.footing import stances_of, unwound
 from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
@@ -16,8 +16,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
-from .paces import FLIGHT, MARGIN, SWINGING, hump, led
-from .targets import low_pass
+from .paces import FLIGHT, calm_joints, hump
 from .tracks import Tracks
 
 FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
@@ -49,9 +48,9 @@ def find_leaps(clip: Clip) -> list[Leap]:
     Raises ConfigError for one that runs: it has a foot in the air before it leaves the ground.
     """
     planted = measure_contacts(clip).planted
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], ~planted.any(axis=1), [0]])))
     found = []
-    for a, b in edges.reshape(-1, 2):
+    for a, last in stances_of(np.asarray(~planted.any(axis=1))):
+        b = last + 1
         if (b - a) * clip.dt <= FLIGHT:
             continue
         around = round(TOGETHER / clip.dt)
@@ -131,9 +130,7 @@ def plan_leaps(
         facing[late:] = goal[HEADING]
     flat, yaws = _soles(spots)
     places = np.concatenate([flat, np.repeat(lifts[:, None, None], 2, axis=1)], axis=2)
-    standing, (least, most) = robot.standing_qpos[7:], (robot.joint_range + [MARGIN, -MARGIN]).T
-    calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
-    coarse = led(calm, standing, standing, lead, lead, 2 * lead + len(calm))
+    coarse = calm_joints(robot, qpos, lead, lead, 2 * lead + len(qpos))
     times, at = np.arange(len(coarse)) * RATE, np.arange(frames) * dt
     joints = np.stack([np.interp(at, times, column) for column in coarse.T], axis=1)
     level = Rotation.from_euler("z", yaws.reshape(-1, 1)).as_rotvec().reshape(frames, 2, 3)

@@ -1,6 +1,6 @@
 """Where a robot has hips, knees, ankles, shoulders, elbows and hands: read off its model."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -9,6 +9,16 @@ from poise.envs.robots.robot import Robot
 
 LATERAL = 0.03  # [m] from the middle: the end of an arm is further
 ABOVE = 0.3  # [m] between the two points of a trunk without arms
+
+
+class Placed(Protocol):
+    """What has a place in a posture."""
+
+    def place(self, data: mujoco.MjData) -> np.ndarray:
+        """(3,) in the world [m]."""
+
+    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """(3, nv) of its velocity by the generalized velocity."""
 
 
 class Point(NamedTuple):
@@ -29,6 +39,21 @@ class Point(NamedTuple):
             mujoco.mj_jac(model, data, part, None, place, body)
             total += part
         return total / len(self.parts)
+
+
+class Difference(NamedTuple):
+    """One point as seen from another, in the world's axes."""
+
+    point: Placed
+    origin: Placed
+
+    def place(self, data: mujoco.MjData) -> np.ndarray:
+        """(3,) [m]."""
+        return self.point.place(data) - self.origin.place(data)
+
+    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """(3, nv)."""
+        return self.point.jacobian(model, data) - self.origin.jacobian(model, data)
 
 
 def sole_corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:
@@ -63,7 +88,7 @@ def find_limbs(robot: Robot) -> Limbs:
     data.qpos[:] = robot.standing_qpos
     mujoco.mj_kinematics(model, data)
     feet = sorted(robot.soles, key=lambda sole: -data.xpos[sole.body_id][1])
-    chains = [_joints(model, sole.body_id) for sole in feet]
+    chains = [joints_to(model, sole.body_id) for sole in feet]
     points: dict[str, Point] = {}
     for side, own, other in zip(("left", "right"), chains, chains[::-1], strict=True):
         leg = [joint for joint in own if joint not in other]
@@ -83,7 +108,7 @@ def find_limbs(robot: Robot) -> Limbs:
     return Limbs(points, at, float(np.mean(lengths)))
 
 
-def _joints(model: mujoco.MjModel, body: int) -> list[int]:
+def joints_to(model: mujoco.MjModel, body: int) -> list[int]:
     """The joints between the root and a body, from the root on; without the free joint."""
     found: list[int] = []
     while body:
@@ -128,7 +153,7 @@ def _arm(model: mujoco.MjModel, data: mujoco.MjData, legs: set[int], sign: int) 
         chain
         for joint in range(1, model.njnt)
         if joint not in legs and sign * data.xpos[model.jnt_bodyid[joint]][1] > LATERAL
-        for chain in [_joints(model, int(model.jnt_bodyid[joint]))]
+        for chain in [joints_to(model, int(model.jnt_bodyid[joint]))]
         if not legs & set(chain[-2:])
     ]
     return max(chains, key=len, default=[])

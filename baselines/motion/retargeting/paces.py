@@ -8,12 +8,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.foot_steps import STANDING
-from poise.baselines.balance.references.footing import root_turns
+from poise.baselines.balance.references.footing import root_turns, stances_of
 from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import foot_signs, nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
@@ -63,13 +63,11 @@ def find_paces(clip: Clip) -> list[Pace]:
         ConfigError: no foot is planted in the first frame, or none is for 0.07 s; no step.
     """
     planted = measure_contacts(clip).planted
-    free = np.flatnonzero(~planted.any(axis=1))
-    runs = [run for run in np.split(free, np.flatnonzero(np.diff(free) > 1) + 1) if len(run)]
-    longest = max(runs, key=len, default=free)
-    if len(longest) * clip.dt > FLIGHT or not planted[0].any():
+    first, time = longest_flight(planted, clip.dt)
+    if time > FLIGHT or not planted[0].any():
         raise ConfigError(
-            f"both feet are off the ground for {len(longest) * clip.dt:.2f} s at "
-            f"{longest[0] * clip.dt:.2f} s: no controller flies", source=clip.name, field="feet",
+            f"both feet are off the ground for {time:.2f} s at {first * clip.dt:.2f} s: no "
+            "controller flies", source=clip.name, field="feet",
         )  # fmt: skip
     turned = np.degrees(np.ptp(np.unwrap(clip.facing())))
     if turned > TURN:
@@ -78,13 +76,11 @@ def find_paces(clip: Clip) -> list[Pace]:
     places, found = clip.places(), []
     for foot, side in enumerate(SIDES):
         heights = places[:, clip.skeleton.joint(f"ankle_{side}", clip.name), 2]
-        edges = np.diff(np.concatenate([[0], planted[:, foot].astype(int), [0]]))
-        begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-        low = float(heights[planted[:, foot]].mean())
-        for k, (a, b) in enumerate(zip(begins, ends, strict=True)):
+        stances, low = stances_of(planted[:, foot]), float(heights[planted[:, foot]].mean())
+        for k, (a, b) in enumerate(stances):
             if a == 0 or (len(planted) - a) * clip.dt < BOTH:  # the clip shows no step's end
                 continue
-            left = int(ends[k - 1]) if k else max(int(a) - round(SWING / clip.dt), 0)
+            left = stances[k - 1][1] if k else max(a - round(SWING / clip.dt), 0)
             apex = float(heights[left : a + 1].max()) - low
             found.append(Pace(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
     found.sort(key=lambda pace: pace.land)
@@ -150,10 +146,7 @@ def plan_paces(
     lean[:, :2] = low_pass(lean[:, :2], LEANING)
     root = led(lean, np.zeros(3), np.array([0.0, 0.0, yaws[-1].mean()]),
                 lead, begin, frames)  # fmt: skip
-    standing = robot.standing_qpos[7:]
-    least, most = (robot.joint_range + [MARGIN, -MARGIN]).T
-    calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
-    joints = led(calm, standing, standing, lead, begin, frames)
+    joints = calm_joints(robot, qpos, lead, begin, frames)
     return FootPlan(RATE, joints, root, _heights(frames, times, h, low), places,
                     turns.reshape(frames, 2, 3), planted)  # fmt: skip
 
@@ -195,6 +188,14 @@ def led(
     before, after = begin - lead, frames - begin - len(values) - lead
     return np.concatenate([np.repeat(first[None], before, axis=0), into, values, back,
                            np.repeat(last[None], after, axis=0)])  # fmt: skip
+
+
+def calm_joints(robot: Robot, qpos: np.ndarray, lead: int, begin: int, frames: int) -> np.ndarray:
+    """(F, nj) joints of a clip's postures, low-passed and within their limits, led from and to
+    standing."""
+    standing, (least, most) = robot.standing_qpos[7:], (robot.joint_range + [MARGIN, -MARGIN]).T
+    calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
+    return led(calm, standing, standing, lead, begin, frames)
 
 
 def frames_before(paces: list[Pace], lead: int) -> int:

@@ -23,6 +23,8 @@ from .tracks import find_tracks, first_heading
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
 LEAD = 1.0  # [s] from standing into the clip, and back
 SHORTER, SHORTEST = 0.94, 0.3  # by which ways are shortened until legs reach, and the end of that
+#: the robot's limbs, what they are to do from standing to standing, and whether the feet step
+AskedOf = tuple[Limbs, BodyTargets, bool]
 #: shares of the clip's lengths of steps and of its tempo, the fastest first
 TRIED = sorted(
     [(stride, 1.0) for stride in (1.0, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5, 0.4)]
@@ -91,20 +93,6 @@ def retarget(
     return retarget_to(asked, clip, robot, smooth=smooth, lead=lead)
 
 
-class AskedOf(NamedTuple):
-    """What a clip asks of a robot.
-
-    Attributes:
-        limbs: the robot's.
-        targets: from standing to standing.
-        steps: whether the feet step, else they stay.
-    """
-
-    limbs: Limbs
-    targets: BodyTargets
-    steps: bool
-
-
 def retarget_to(
     asked: AskedOf, clip: Clip, robot: Robot, *, smooth: float, lead: float
 ) -> Retargeted:
@@ -148,7 +136,7 @@ def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted:
     limbs = find_limbs(robot)
     targets = clip_targets(clip, limbs.has_arms, smooth, first_heading(clip) if steps else None)
     whole = between_standing(targets, standing_targets(limbs), lead)
-    return AskedOf(limbs, whole, steps)
+    return limbs, whole, steps
 
 
 def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float) -> Retargeted:

@@ -13,7 +13,7 @@ from poise.baselines.motion.clips.skeleton import ROLES, Skeleton
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .limbs import Point, find_limbs
+from .limbs import Point, find_limbs, joints_to
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
@@ -34,7 +34,7 @@ def robot_skeleton(robot: Robot) -> Skeleton:
     hands = [(body, place) for role, point in points.items()
              if role.startswith("hand") for body, place in point.parts]  # fmt: skip
     feet = [(sole.body_id, sole.position) for sole in robot.soles]
-    ends = [(_last_joint(model, body), data.xpos[body] + data.xmat[body].reshape(3, 3) @ place)
+    ends = [(_joints_above(model, body)[-1], Point(((body, place),)).place(data))
             for body, place in (*hands, *feet)]  # fmt: skip
     return Skeleton(
         (model.body(robot.root_body_id).name or "root", *robot.joint_names),
@@ -96,12 +96,6 @@ def _axes(robot: Robot) -> np.ndarray:
     return _zero(robot).xaxis[1:].copy()
 
 
-def _last_joint(model: mujoco.MjModel, body: int) -> int:
-    while model.body_jntnum[body] == 0:
-        body = int(model.body_parentid[body])
-    return int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
-
-
 def _hinge_at(model: mujoco.MjModel, point: Point) -> int:
     """The first joint at an anchor: other hinges of the same limb's joint hang on it."""
     body, place = point.parts[0]
@@ -110,9 +104,12 @@ def _hinge_at(model: mujoco.MjModel, point: Point) -> int:
     return next(joint for joint in joints if np.array_equal(model.jnt_pos[joint], place))
 
 
+def _joints_above(model: mujoco.MjModel, body: int) -> list[int]:
+    """The joints that move a body, the free one first."""
+    return [0, *joints_to(model, body)]
+
+
 def _joint_above(model: mujoco.MjModel, joint: int) -> int:
-    """The joint that moves a joint: the one before it on its body, or the last of those above."""
-    body = int(model.jnt_bodyid[joint])
-    if joint > model.body_jntadr[body]:
-        return joint - 1
-    return _last_joint(model, int(model.body_parentid[body]))
+    """The joint that moves a joint."""
+    above = _joints_above(model, int(model.jnt_bodyid[joint]))
+    return above[above.index(joint) - 1]

@@ -53,26 +53,7 @@ def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float
 
     Raises PoiseError if a QP has no solution.
     """
-    ik = FrameIk(robot, limbs, list(targets.directions))
-    qpos, times = np.empty((len(targets), robot.model.nq)), np.zeros(len(targets))
-    for frame in range(len(targets)):
-        begin = time.thread_time()
-        qpos[frame] = ik.solve(targets, frame)
-        times[frame] += time.thread_time() - begin
-    wanted = low_pass(qpos[:, 7:], smooth)
-    angles, sole_error = np.empty((len(targets), len(targets.directions))), 0.0
-    penetration = 0.0
-    for frame in range(len(targets)):
-        begin = time.thread_time()
-        qpos[frame] = ik.planted_near(qpos[frame], wanted[frame])
-        times[frame] += time.thread_time() - begin
-        ik.frame.aim(targets, frame)
-        angles[frame] = ik.frame.angles()
-        sole_error = max(sole_error, ik.sole_error())
-        penetration = max(penetration, ik.clearance.depth(ik.configuration.data))
-    rms = np.sqrt((angles**2).mean(axis=0))
-    errors = dict(zip(targets.directions, rms.tolist(), strict=True))
-    return Solved(qpos, sole_error, errors, penetration, float(np.median(times)))
+    return FrameIk(robot, limbs, list(targets.directions)).solve_all(targets, smooth)
 
 
 def plant(robot: Robot, limbs: Limbs, qpos: np.ndarray, close: float = 1e-5) -> np.ndarray:
@@ -96,7 +77,7 @@ def plant(robot: Robot, limbs: Limbs, qpos: np.ndarray, close: float = 1e-5) -> 
         made[frame] = np.concatenate([root, joints])
         ik.configuration.update(made[frame])
         if ik.sole_error() > close:
-            made[frame] = ik.planted_near(made[frame], joints)
+            made[frame] = ik.planted_near(made[frame])
     return made
 
 
@@ -116,6 +97,8 @@ def _root_for(
 class FrameIk:
     """The tasks of one robot, from frame to frame."""
 
+    first = 1  # times that the first frame is solved
+
     def __init__(self, robot: Robot, limbs: Limbs, names: list[str]):
         self.robot, self.model = robot, robot.model
         self.frame = FrameTasks(robot, limbs, names)
@@ -126,6 +109,37 @@ class FrameIk:
         self.damping = LEAST_DAMPING
         self.clearance = ClearanceLimit(robot, self.configuration.data)
         self.limits = [mink.ConfigurationLimit(self.model, 1.0, MARGIN), self.clearance]
+
+    def solve_all(self, targets: BodyTargets, cutoff: float) -> Solved:
+        """All frames: solved, low-passed at `cutoff` [Hz], planted and measured."""
+        qpos, times = np.empty((len(targets), self.model.nq)), np.zeros(len(targets))
+        for frame in range(len(targets)):
+            begin = time.thread_time()
+            self.tread(frame)
+            for _ in range(1 if frame else self.first):
+                qpos[frame] = self.solve(targets, frame)
+            times[frame] += time.thread_time() - begin
+        wanted = self.smoothed(qpos, cutoff)
+        angles, sole_error, penetration = [], 0.0, 0.0
+        for frame in range(len(targets)):
+            begin = time.thread_time()
+            self.tread(frame)
+            qpos[frame] = self.planted_near(wanted[frame])
+            times[frame] += time.thread_time() - begin
+            self.frame.aim(targets, frame)
+            angles.append(self.frame.angles())
+            sole_error = max(sole_error, self.sole_error())
+            penetration = max(penetration, self.clearance.depth(self.configuration.data))
+        rms = np.sqrt(np.mean(np.square(angles), axis=0)).tolist()
+        errors = dict(zip(targets.directions, rms, strict=True))
+        return Solved(qpos, sole_error, errors, penetration, float(np.median(times)))
+
+    def tread(self, frame: int) -> None:
+        """Take where soles are in a frame as targets: here they stay."""
+
+    def smoothed(self, qpos: np.ndarray, cutoff: float) -> np.ndarray:
+        """(F, nq) the postures, their joints low-passed."""
+        return np.concatenate([qpos[:, :7], low_pass(qpos[:, 7:], cutoff)], axis=1)
 
     def solve(self, targets: BodyTargets, frame: int) -> np.ndarray:
         """(nq,) the posture of a frame."""
@@ -145,9 +159,9 @@ class FrameIk:
         self.damping = damping
         return self.configuration.q.copy()
 
-    def planted_near(self, qpos: np.ndarray, joints: np.ndarray) -> np.ndarray:
-        """(nq,) the posture nearest to `joints` (nj,) with planted soles; begun at `qpos`."""
-        self.configuration.update(np.concatenate([qpos[:7], joints]))
+    def planted_near(self, qpos: np.ndarray) -> np.ndarray:
+        """(nq,) the posture with planted soles that is nearest to one."""
+        self.configuration.update(qpos)
         tasks = self.near_tasks()
         for _ in range(PLANTING):
             step = self._step(tasks, LEAST_DAMPING)

@@ -1,7 +1,5 @@
 """Postures of a robot whose pelvis and soles go along given tracks, frame by frame, by mink."""
 
-import time
-
 import mink
 import numpy as np
 
@@ -14,53 +12,31 @@ from poise.envs.robots.robot import Robot
 from .limbs import Limbs
 from .solve import FrameIk, Solved
 from .targets import low_pass
-from .tasks import PlaceTask
+from .tasks import PointTask
 from .tracks import Tracks
 
 PELVIS = 5.0  # cost of its place [1/m]
 SWING, LEVEL = 30.0, 1.0  # costs of a sole in the air: place [1/m] and turn [1/rad]
 ROOT, LEAN = 10.0, 3.0  # the same of the root where the filtered postures are made to stand
-FIRST = 8  # times that the first frame is solved: it begins in standing
 
 
 def solve_tracks(robot: Robot, limbs: Limbs, tracks: Tracks, cutoff: float) -> Solved:
     """One posture after the other, as `solve_frames`: planted soles are constraints, those in the
     air and the pelvis are tasks. All is low-passed at `cutoff` [Hz], and the nearest postures with
     planted soles are what remains. Raises PoiseError if a QP has no solution."""
-    ik = _TrackIk(robot, limbs, tracks)
-    qpos, times = np.empty((len(tracks.pelvis), robot.model.nq)), []
-    for frame in range(len(qpos)):
-        begin = time.thread_time()
-        ik.tread(frame)
-        for _ in range(1 if frame else FIRST):
-            qpos[frame] = ik.solve(tracks.body, frame)
-        times.append(time.thread_time() - begin)
-    signs = np.sign(np.sum(qpos[1:, 3:7] * qpos[:-1, 3:7], axis=1))
-    qpos[1:, 3:7] *= np.cumprod(np.where(signs == 0.0, 1.0, signs))[:, None]
-    wanted = low_pass(qpos, cutoff)
-    wanted[:, 3:7] /= np.linalg.norm(wanted[:, 3:7], axis=1, keepdims=True)
-    angles, sole_error, penetration = [], 0.0, 0.0
-    for frame in range(len(qpos)):
-        ik.tread(frame)
-        qpos[frame] = ik.planted_near(wanted[frame], wanted[frame, 7:])
-        ik.frame.aim(tracks.body, frame)
-        angles.append(ik.frame.angles())
-        sole_error = max(sole_error, float(np.abs(ik.soles.whole_error(ik.configuration)).max(
-            initial=0.0)))  # fmt: skip
-        penetration = max(penetration, ik.clearance.depth(ik.configuration.data))
-    rms = np.sqrt(np.mean(np.square(angles), axis=0)).tolist()
-    errors = dict(zip(tracks.body.directions, rms, strict=True))
-    return Solved(qpos, sole_error, errors, penetration, float(np.median(times)))
+    return _TrackIk(robot, limbs, tracks).solve_all(tracks.body, cutoff)
 
 
 class _TrackIk(FrameIk):
     """The tasks of one robot, with soles that are planted here and there."""
 
+    first = 8  # it begins in standing
+
     def __init__(self, robot: Robot, limbs: Limbs, tracks: Tracks):
         super().__init__(robot, limbs, list(tracks.body.directions))
         self.tracks, data = tracks, self.configuration.data
         segments, _, _, self.posture = self.frame.tasks
-        self.segments, self.pelvis = segments, PlaceTask(limbs.points["pelvis"], PELVIS)
+        self.segments, self.pelvis = segments, PointTask(limbs.points["pelvis"], PELVIS)
         self.feet = [mink.FrameTask(sole.body, "body", SWING, LEVEL) for sole in robot.soles]
         self.hard = self.soles.feet
         self.root = mink.FrameTask(robot.model.body(robot.root_body_id).name, "body", ROOT, LEAN)
@@ -96,6 +72,18 @@ class _TrackIk(FrameIk):
                 return super()._step([*tasks, *self.feet], damping)
             finally:
                 self.soles.feet = held
+
+    def smoothed(self, qpos: np.ndarray, cutoff: float) -> np.ndarray:
+        """(F, nq) the postures, low-passed, the root's quaternions as they follow each other."""
+        signs = np.sign(np.sum(qpos[1:, 3:7] * qpos[:-1, 3:7], axis=1))
+        qpos[1:, 3:7] *= np.cumprod(np.where(signs == 0.0, 1.0, signs))[:, None]
+        wanted = low_pass(qpos, cutoff)
+        wanted[:, 3:7] /= np.linalg.norm(wanted[:, 3:7], axis=1, keepdims=True)
+        return wanted
+
+    def sole_error(self) -> float:
+        """Largest coordinate by which a planted foot is off [m, rad]."""
+        return float(np.abs(self.soles.whole_error(self.configuration)).max(initial=0.0))
 
     def near_tasks(self) -> list[mink.Task]:
         """The joints, and the root, as they are in the configuration."""

@@ -3,7 +3,7 @@
 mink is imported here and in `solve.py` only, and these only when something is retargeted.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import mink
 import mujoco
@@ -11,7 +11,7 @@ import numpy as np
 
 from poise.envs.robots.robot import Robot
 
-from .limbs import Limbs, Point
+from .limbs import Difference, Limbs, Placed, Point
 from .targets import LINES, BodyTargets
 
 RANK = 1e-6  # of the largest singular value: smaller ones are rounding
@@ -61,40 +61,20 @@ class SegmentTask(mink.Task):
         return self.differences @ places
 
 
-class HeightTask(mink.Task):
-    """The middle of the hips is `height` [m] above that of the ankles."""
+class PointTask(mink.Task):
+    """The coordinates `axes` of a point of the body, or of one from another, are `goal` [m]."""
 
-    def __init__(self, limbs: Limbs, cost: float):
-        super().__init__(cost=np.array([cost]), gain=1.0, lm_damping=0.0)
-        self.pelvis, self.feet = limbs.points["pelvis"], limbs.points["feet"]
-        self.height = 0.0
-
-    def compute_error(self, configuration: mink.Configuration) -> np.ndarray:
-        """(1,) [m]."""
-        data = configuration.data
-        return np.array([self.pelvis.place(data)[2] - self.feet.place(data)[2] - self.height])
-
-    def compute_jacobian(self, configuration: mink.Configuration) -> np.ndarray:
-        """(1, nv)."""
-        model, data = configuration.model, configuration.data
-        both = self.pelvis.jacobian(model, data) - self.feet.jacobian(model, data)
-        return both[2:3]
-
-
-class PlaceTask(mink.Task):
-    """A point of the body is at `goal` (3,) [m]."""
-
-    def __init__(self, point: Point, cost: float):
-        super().__init__(cost=np.full(3, cost), gain=1.0, lm_damping=0.0)
-        self.point, self.goal = point, np.zeros(3)
+    def __init__(self, point: Placed, cost: float, axes: Sequence[int] = (0, 1, 2)):
+        super().__init__(cost=np.full(len(axes), cost), gain=1.0, lm_damping=0.0)
+        self.point, self.axes, self.goal = point, list(axes), np.zeros(len(axes))
 
     def compute_error(self, configuration: mink.Configuration) -> np.ndarray:
-        """(3,) [m]."""
-        return self.point.place(configuration.data) - self.goal
+        """(k,) [m]."""
+        return self.point.place(configuration.data)[self.axes] - self.goal
 
     def compute_jacobian(self, configuration: mink.Configuration) -> np.ndarray:
-        """(3, nv)."""
-        return self.point.jacobian(configuration.model, configuration.data)
+        """(k, nv)."""
+        return self.point.jacobian(configuration.model, configuration.data)[self.axes]
 
 
 class SolesTask(mink.Task):
@@ -140,9 +120,10 @@ class FrameTasks:
 
     def __init__(self, robot: Robot, limbs: Limbs, names: list[str]):
         self.configuration = mink.Configuration(robot.model, q=robot.standing_qpos)
-        self.segments, self.height = SegmentTask(limbs, names), HeightTask(limbs, HEIGHT)
+        hips = Difference(limbs.points["pelvis"], limbs.points["feet"])
+        self.segments, self.height = SegmentTask(limbs, names), PointTask(hips, HEIGHT, axes=[2])
         data = self.configuration.data
-        self.standing = float((self.height.pelvis.place(data) - self.height.feet.place(data))[2])
+        self.standing = float(hips.place(data)[2])
         com = mink.ComTask(np.array([COM, COM, 0.0]))
         com.set_target_from_configuration(self.configuration)
         posture = mink.PostureTask(robot.model, _posture_costs(limbs, robot.model, data))
@@ -152,7 +133,7 @@ class FrameTasks:
     def aim(self, targets: BodyTargets, frame: int) -> None:
         """Take what is asked in a frame as targets."""
         self.segments.aim(targets.directions, frame)
-        self.height.height = self.standing * float(targets.height[frame])
+        self.height.goal[0] = self.standing * float(targets.height[frame])
 
     def errors(self) -> np.ndarray:
         """(m,) errors W e of all tasks, each times its cost."""

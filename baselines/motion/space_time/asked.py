@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
 from poise.baselines.motion.retargeting.clearance import ClearanceLimit, Pair
@@ -11,8 +10,6 @@ from poise.baselines.motion.retargeting.tasks import FrameTasks
 from poise.baselines.motion.space_time.constraints.constraint import Constraint
 from poise.baselines.motion.space_time.constraints.scene import Rows, Scene
 from poise.baselines.motion.space_time.constraints.touch import Touch
-
-from .stance import Stance
 
 ENDLESS = np.array([np.inf])
 
@@ -63,19 +60,3 @@ class Asked:
         touching = self.touching.get(frame, ())
         return [pair._replace(kept=0.0) if frozenset(pair[:2]) in touching else pair
                 for pair in self.limit.candidates(scene.at(frame))]  # fmt: skip
-
-
-def soles_over_floor(scene: Scene, stance: Stance, frame: int) -> list[Rows]:
-    """z ≥ 0 for the corners of soles that are not planted."""
-    data, jacobian, found = scene.at(frame), np.empty((3, scene.model.nv)), []
-    for i, sole in enumerate(scene.robot.soles):
-        if stance.planted[frame, i]:
-            continue
-        corners = scene.corners(i)
-        derivative = np.empty((len(corners), scene.model.nv))
-        for row, corner in zip(derivative, corners, strict=True):
-            mujoco.mj_jac(scene.model, data, jacobian, None, corner, sole.body_id)
-            row[:] = jacobian[2]
-        zero = np.zeros(len(corners))
-        found.append(Rows({frame: derivative}, corners[:, 2].copy(), zero, zero + np.inf))
-    return found

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import product
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,7 +13,7 @@ from poise.configs.errors import ConfigError
 
 from .asked import Asked
 from .problem import MARGIN
-from .stance import Stance, motions, plant
+from .stance import motions, plant
 
 EVERY = 0.1  # [s] between keyframes
 STEPS = 5  # values of each parameter; fewer where that makes too many trials
@@ -25,16 +24,7 @@ FAR = 0.05  # [m, rad] an excess whose coefficient is one half
 SOLE, NEAR = 1e-3, 1e-3  # [m] soles off their places, links too near: still satisfied
 
 
-class Trials(NamedTuple):
-    """How much was tried: keyframes that were changed, and trials of all keyframes."""
-
-    changed: int
-    trials: int
-
-
-def by_trial(
-    scene: Scene, asked: Asked, stance: Stance, constraints: Sequence[Constraint]
-) -> Trials:
+def by_trial(scene: Scene, asked: Asked, constraints: Sequence[Constraint]) -> None:
     """Move the postures of a scene so that as many constraints hold as trials in steps find.
 
     Every keyframe by itself: each constraint that holds then has an operation with a parameter s,
@@ -49,21 +39,17 @@ def by_trial(
     count = max(round((len(scene) - 1) * scene.dt / EVERY), 2) + 1
     keys = np.unique(np.round(np.linspace(0, len(scene) - 1, count)).astype(int))
     part = scene.part(keys)
-    places = Stance(stance.planted[keys], stance.places[keys], stance.axes[keys])
     active = [set(each.frames(part).tolist()) for each in constraints]
     deltas = np.zeros((len(keys), scene.model.nv))
-    changed = trials = 0
     for key in range(1, len(keys) - 1):
         here = [each for each, frames in zip(constraints, active, strict=True) if key in frames]
         if not here:
             continue
         before = part.qpos[key].copy()
-        found, tried = _best(part, asked, places, here, key, int(keys[key]))
+        found = _best(part, asked, here, key)
         part.qpos[key] = found
         part.move(part.qpos)
-        trials += tried
         mujoco.mj_differentiatePos(scene.model, deltas[key], 1.0, before, found)
-        changed += bool(np.abs(deltas[key]).max() > 0.0)
     between = PchipInterpolator(keys, deltas)(np.arange(len(scene)))
     low, high = scene.robot.joint_range[:, 0] + MARGIN, scene.robot.joint_range[:, 1] - MARGIN
     moved = np.flatnonzero(np.abs(between).max(axis=1) > 0.0)
@@ -72,15 +58,11 @@ def by_trial(
     for _ in range(ROUNDS):  # planting moves joints, too
         scene.qpos[moved, 7:] = np.clip(scene.qpos[moved, 7:], low, high)
         scene.move(scene.qpos)
-        plant(scene, stance, moved)
-    return Trials(changed, trials)
+        plant(scene, moved)
 
 
-def _best(
-    part: Scene, asked: Asked, stance: Stance, constraints: Sequence[Constraint], key: int,
-    frame: int,
-) -> tuple[np.ndarray, int]:  # fmt: skip
-    """The posture (nq,) of a keyframe that satisfies most, and the number of trials."""
+def _best(part: Scene, asked: Asked, constraints: Sequence[Constraint], key: int) -> np.ndarray:
+    """The posture (nq,) of a keyframe that satisfies most."""
     steps = min(STEPS, int(MOST ** (1.0 / len(constraints)) + 1e-9))
     if steps < 2:
         raise ConfigError(f"by trial at most {int(np.log2(MOST))} constraints can hold at one "
@@ -88,21 +70,17 @@ def _best(
                           choices=("spacetime",))  # fmt: skip
     values = product(np.linspace(0.0, 1.0, steps), repeat=len(constraints))
     begin, best, score = part.qpos[key].copy(), part.qpos[key].copy(), (-1, 0.0)
-    tried = 0
     for shares in sorted(values, key=sum):
         part.qpos[key] = begin
         part.move(part.qpos)
-        _operate(part, stance, constraints, key, np.array(shares))
-        found = _score(part, asked, stance, constraints, key, frame)
-        tried += 1
+        _operate(part, constraints, key, np.array(shares))
+        found = _score(part, asked, constraints, key)
         if found > score:
             best, score = part.qpos[key].copy(), found
-    return best, tried
+    return best
 
 
-def _operate(
-    part: Scene, stance: Stance, constraints: Sequence[Constraint], key: int, shares: np.ndarray
-) -> None:
+def _operate(part: Scene, constraints: Sequence[Constraint], key: int, shares: np.ndarray) -> None:
     """Move a keyframe by shares of what its constraints miss, within the joint limits."""
     if not shares.any():
         return
@@ -119,13 +97,13 @@ def _operate(
         if not gaps:
             return
         gap, derivative = np.concatenate(gaps), np.concatenate(jacobians)
-        ways = motions(part, stance, key)
+        ways = motions(part, key)
         J = derivative[gap != 0.0] @ ways.free
         step = J.T @ np.linalg.solve(J @ J.T + DAMPING * np.eye(len(J)), gap[gap != 0.0])
         part.displace(key, ways.free @ step)
         part.qpos[key, 7:] = np.clip(part.qpos[key, 7:], low, high)
         part.move(part.qpos)
-        plant(part, stance, np.array([key]))
+        plant(part, np.array([key]))
         rows = [list(each.rows(part, [key])) for each in constraints]
 
 
@@ -140,22 +118,20 @@ def _missing(rows: Rows) -> np.ndarray:
 
 
 def _score(
-    part: Scene, asked: Asked, stance: Stance, constraints: Sequence[Constraint], key: int,
-    frame: int,
-) -> tuple[int, float]:  # fmt: skip
+    part: Scene, asked: Asked, constraints: Sequence[Constraint], key: int
+) -> tuple[int, float]:
     """How many conditions are satisfied, and −Σ e, rounded so that ties are ties."""
     satisfied, coefficients = 0, 0.0
     for each in constraints:
         excess = max((float(r.excess.max()) for r in each.rows(part, [key])), default=0.0)
         satisfied += excess * each.scale(part) <= max(each.tolerance, 1e-2 * FAR)
         coefficients += excess / (excess + FAR)
-    data = part.at(key)
-    corners = [
-        np.linalg.norm(own - part.planted_corners[key, i, : len(own)], axis=1).max()
-        for i in np.flatnonzero(stance.planted[key])
-        for own in [part.corners(int(i))]
-    ]
-    satisfied += max(corners, default=0.0) <= SOLE
+    data, off = part.at(key), 0.0
+    for i in range(len(part.robot.soles)):
+        corners = part.corners(i)
+        ways = corners - part.planted_corners[key, i, : len(corners)]
+        off = max(off, float(np.linalg.norm(ways, axis=1).max()))
+    satisfied += off <= SOLE
     satisfied += asked.limit.depth(data) <= NEAR
     joints, (low, high) = part.qpos[key, 7:], part.robot.joint_range.T
     satisfied += bool(np.all(joints >= low) and np.all(joints <= high))

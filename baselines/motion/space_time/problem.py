@@ -1,6 +1,6 @@
-"""The whole clip's problem about its postures now: their cost, and the next quadratic program."""
+"""The optimum over a whole clip: what postures cost, and a sequence of quadratic programs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,16 +8,21 @@ from scipy import sparse
 
 from poise.baselines.motion.space_time.constraints.constraint import Constraint
 from poise.baselines.motion.space_time.constraints.scene import Scene
+from poise.configs.errors import PoiseError
 
-from .asked import Asked, soles_over_floor
+from .asked import Asked
 from .program import Penalised, Quadratic, solve_program
-from .stance import Motions, Stance, motions
+from .stance import Motions, motions, plant
 from .trajectory import coordinate_derivative, coordinates, third_difference
 
 PENALTY = 100.0  # of what a user's constraint lacks [1/m, 1/rad], times its weight
-HARD = 300.0  # the same of clearance, of soles in the floor and of joint limits
+HARD = 300.0  # the same of clearance and of joint limits
 DAMPING = 1e-4  # of displacements: what nothing asks for stays
 MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames
+MOST, TRUST = 25, 0.3  # programs, and the largest move of a joint in the first [rad]
+LEAST_TRUST = 2e-3  # [rad] that ends it
+SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step that are tried
+ENOUGH, MET = 1e-3, 0.02  # decreases that end it: of the cost, relative; of the penalties
 
 
 class Cost(NamedTuple):
@@ -44,16 +49,13 @@ class Problem:
 
     e are the errors of `FrameTasks`, x the coordinates of a posture, ρ = (2π f)⁻⁶. Hard are the
     soles where they are planted and the joint limits. By the L1 norm are penalised: constraints of
-    the user's, the clearance of links, and soles in the air that are below the floor
-    [Witkin88; Gleicher98].
+    the user's, and the clearance of links [Witkin88; Gleicher98].
     """
 
     def __init__(
-        self, scene: Scene, asked: Asked, stance: Stance, constraints: Sequence[Constraint],
-        crossover: float,
-    ):  # fmt: skip
-        self.scene, self.asked, self.stance = scene, asked, stance
-        self.constraints = constraints
+        self, scene: Scene, asked: Asked, constraints: Sequence[Constraint], crossover: float
+    ):
+        self.scene, self.asked, self.constraints = scene, asked, constraints
         nv = scene.model.nv
         third = third_difference(len(scene), scene.dt)
         self.third = sparse.kron(third, sparse.identity(nv), format="csr")
@@ -73,8 +75,6 @@ class Problem:
         )
         for frame in self.inner.tolist():
             lacking += HARD * self.asked.too_near(scene, frame)
-            lacking += HARD * sum(float(r.excess.sum())
-                                  for r in soles_over_floor(scene, self.stance, frame))  # fmt: skip
         lacking += sum(each.weight * float(each.rows.excess.sum()) for each in self._wanted())
         return Cost(sum(float(e @ e) for e in errors), self.rho * float(rough @ rough), lacking)
 
@@ -86,10 +86,8 @@ class Problem:
             errors.append(self.asked.errors(scene, frame))
             jacobians.append(sparse.csr_matrix(self.asked.tasks.jacobian()))
             if 0 < frame < len(scene) - 1:
-                moves.append(motions(scene, self.stance, frame))
-                rows = self.asked.clearance(scene, frame)
-                rows += soles_over_floor(scene, self.stance, frame)
-                penalised += [Penalised(each, HARD) for each in rows]
+                moves.append(motions(scene, frame))
+                penalised += [Penalised(each, HARD) for each in self.asked.clearance(scene, frame)]
             else:
                 moves.append(Motions(np.zeros(nv), np.zeros((nv, 0))))
         cost = self._quadratic(np.concatenate(errors), jacobians, moves)
@@ -122,3 +120,44 @@ class Problem:
         rough = self.third @ x + T @ given
         g = 2.0 * (Jb.T @ (errors + J @ given) + self.rho * (Tb.T @ rough))
         return Quadratic(H.tocsr(), g, basis, given, scene.model.nv)
+
+
+def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = None) -> None:
+    """Move the postures of the problem's scene to a minimum of its cost.
+
+    Each program gives displacements; the largest of their shares 1, ½, ¼ and 0.1 is taken that
+    lowers the cost once the soles have been led to their places. The trust region shrinks by half
+    where less than the whole was good, and doubles otherwise.
+
+    Raises PoiseError if OSQP breaks down in the first program.
+    """
+    scene, cost = problem.scene, problem.cost()
+    trust, solved = TRUST, 0
+    while solved < MOST and trust > LEAST_TRUST:
+        step = problem.step(trust)
+        if step is None:
+            if solved == 0:
+                raise PoiseError("OSQP finds no solution of the first program of the clip")
+            break
+        solved += 1
+        before, share, found = scene.qpos.copy(), 0.0, cost
+        for tried in SHARES:
+            for frame in problem.inner.tolist():
+                scene.displace(frame, tried * step[frame])
+            plant(scene, problem.inner)
+            found = problem.cost()
+            if found.whole < cost.whole:
+                share = tried
+                break
+            scene.move(before.copy())
+        if share == 0.0:
+            trust *= 0.25
+            continue
+        enough = cost.whole - found.whole < ENOUGH * cost.whole
+        enough &= cost.lacking - found.lacking < MET
+        cost = found
+        if progress is not None:
+            progress(solved, cost)
+        if enough:
+            break
+        trust = min(2.0 * trust, TRUST) if share == 1.0 else 0.5 * trust

@@ -60,35 +60,30 @@ def measure(scene: Scene, asked: Asked, constraints: tuple[Constraint, ...] = ()
         depth = max(depth, asked.limit.depth(data))
         errors.append(asked.errors(scene, frame))
         angles.append(asked.tasks.angles())
-    soles = measure_soles(scene)
     joints, (low, high) = scene.qpos[:, 7:], scene.robot.joint_range.T
     rms = np.sqrt(np.mean(np.square(angles), axis=0))
-    return Quality(
-        soles.error,
-        soles.skating,
-        soles.skating_largest,
-        max(depth, soles.depth),
+    return measure_soles(
+        scene,
+        depth,
         float(np.maximum(np.maximum(low - joints, joints - high), 0.0).max()),
-        {side: float(np.mean(found)) for side, found in hands.items()},
-        jerk(scene.qpos, scene.dt),
-        float(np.sqrt(np.mean([e @ e for e in errors]))),
         dict(zip(asked.targets.directions, rms.tolist(), strict=True)),
+        {side: float(np.mean(found)) for side, found in hands.items()},
+        float(np.sqrt(np.mean([e @ e for e in errors]))),
         tuple(violation(each, scene) for each in constraints),
     )
 
 
-class SoleQuality(NamedTuple):
-    """Of the corners of planted soles: the largest distance from where they are to be [m], their
-    horizontal speed, its mean and the largest [m/s]; how deep in the floor any sole gets [m]."""
-
-    error: float
-    skating: float
-    skating_largest: float
-    depth: float
-
-
-def measure_soles(scene: Scene) -> SoleQuality:
-    """How soles stay where they are planted."""
+def measure_soles(
+    scene: Scene,
+    depth: float,
+    limit_excess: float,
+    directions: dict[str, float],
+    hands: dict[str, float] | None = None,
+    task_error: float = np.nan,
+    violations: tuple[Violation, ...] = (),
+) -> Quality:
+    """The quality of postures of which all is known but their jerk and how their soles stay; links
+    are `depth` in each other or in the floor [m]."""
     corners = scene.planted_corners
     places = np.empty_like(corners)
     for frame in range(len(scene)):
@@ -100,11 +95,17 @@ def measure_soles(scene: Scene) -> SoleQuality:
     both = (scene.planted[1:] & scene.planted[:-1])[:, :, None]
     speeds = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1) / scene.dt
     skating = speeds[np.broadcast_to(both, speeds.shape)]
-    return SoleQuality(
+    return Quality(
         float(off.max()),
         float(skating.mean()) if skating.size else 0.0,
         float(skating.max(initial=0.0)),
-        float(-places[..., 2].min()),
+        max(depth, float(-places[..., 2].min())),
+        limit_excess,
+        hands or {},
+        jerk(scene.qpos, scene.dt),
+        task_error,
+        directions,
+        violations,
     )
 
 

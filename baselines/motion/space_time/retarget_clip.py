@@ -24,8 +24,8 @@ from poise.baselines.motion.retargeting.retarget import (
     retarget_to,
     targets_on,
 )
-from poise.baselines.motion.space_time.constraints.constraint import Constraint
-from poise.baselines.motion.space_time.constraints.reading import (
+from poise.baselines.motion.space_time.constraints.constraint import (
+    Constraint,
     check_constraints,
     read_constraints,
 )
@@ -33,8 +33,6 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .stance import standing_stance
-from .trajectory import jerk
 from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
@@ -201,22 +199,21 @@ def performable(
     made = retarget_to(given, clip, robot, smooth=smooth, lead=lead)
     from .asked import Asked  # mink is there: `retarget_to` has used it
     from .grid import by_trial
-    from .problem import Problem
+    from .problem import Problem, optimise
     from .quality import measure
-    from .solve import optimise
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted, made.clip.dt)
     if steps:
         return _stepped(made, scene)
-    stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
+    asked = Asked(scene, targets, wanted)
     spent, begun = made.time_per_frame, time.thread_time()
     if chosen == "spacetime":
-        optimise(Problem(scene, asked, stance, wanted, CROSSOVER),
+        optimise(Problem(scene, asked, wanted, CROSSOVER),
                  None if progress is None else lambda i, cost: progress(
                      f"program {i}: tasks {cost.tasks:.3f}, third derivative {cost.rough:.3f}, "
                      f"constraints {cost.lacking:.3f}"))  # fmt: skip
     elif chosen == "grid":
-        by_trial(scene, asked, stance, wanted)
+        by_trial(scene, asked, wanted)
     if chosen != "frame":
         spent = (time.thread_time() - begun) / len(scene)
     done = replace(made.clip, qpos=scene.qpos)
@@ -226,13 +223,9 @@ def performable(
 
 def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
     """A clip with steps, whose frames are not those of what was asked for: hands are left out."""
-    from .quality import Quality, measure_soles
+    from .quality import measure_soles
 
-    soles = measure_soles(scene)
-    quality = Quality(
-        soles.error, soles.skating, soles.skating_largest, max(made.penetration, soles.depth),
-        made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
-    )  # fmt: skip
+    quality = measure_soles(scene, made.penetration, made.limit_excess, made.direction_error)
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
                           made.begins, made.tempo, made.flight, made.bound)  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Soles that are planted: where, when, and how postures move that keep them there."""
+"""How postures move whose soles stay where the robot stands, and how they are led back there."""
 
 from typing import NamedTuple
 
@@ -10,20 +10,6 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 RANK = 1e-6  # of the largest singular value: smaller ones are rounding
 SINGULAR = 0.02  # as in the solver of single frames: what hardly moves a foot is damped
 NEWTON, CLOSE = 6, 1e-10  # steps to planted soles at most, and the error [m, rad] that ends them
-
-
-class Stance(NamedTuple):
-    """Which soles are planted in each frame, and where their feet then are.
-
-    Attributes:
-        planted: (F, 2) by the order of the robot's soles.
-        places: (F, 2, 3) of the feet's bodies [m].
-        axes: (F, 2, 4) their orientations, wxyz.
-    """
-
-    planted: np.ndarray
-    places: np.ndarray
-    axes: np.ndarray
 
 
 class Motions(NamedTuple):
@@ -39,26 +25,13 @@ class Motions(NamedTuple):
     free: np.ndarray
 
 
-def standing_stance(scene: Scene) -> Stance:
-    """Both soles where the robot stands, in all frames."""
-    data, frames = scene.see(scene.robot.standing_qpos), len(scene)
-    bodies = [sole.body_id for sole in scene.robot.soles]
-    places = np.tile(data.xpos[bodies], (frames, 1, 1))
-    return Stance(
-        np.ones((frames, 2), dtype=bool), places, np.tile(data.xquat[bodies], (frames, 1, 1))
-    )
-
-
-def motions(scene: Scene, stance: Stance, frame: int) -> Motions:
-    """The displacements that keep a frame's planted soles.
+def motions(scene: Scene, frame: int) -> Motions:
+    """The displacements that keep both soles of a frame where they are planted.
 
     With the rows A = U S Vᵀ of both feet, N is the complement of V, and δ₀ = −V S/(S² + λ²) Uᵀ e:
     where legs hardly move a foot (ankles of one axis) an error asks for no large motion.
     """
-    data, nv = scene.at(frame), scene.model.nv
-    error, rows = sole_error(scene, data, stance, frame)
-    if not len(rows):
-        return Motions(np.zeros(nv), np.eye(nv))
+    error, rows = sole_error(scene, frame)
     left, values, right = np.linalg.svd(rows)
     rank = int((values > RANK * values[0]).sum())
     gains = values[:rank] / (values[:rank] ** 2 + SINGULAR**2)
@@ -66,30 +39,27 @@ def motions(scene: Scene, stance: Stance, frame: int) -> Motions:
     return Motions(given, right[rank:].T)
 
 
-def sole_error(
-    scene: Scene, data: mujoco.MjData, stance: Stance, frame: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Errors (6 k,) of the k planted feet in a posture [m, rad], and their derivative (6 k, nv)."""
-    errors, rows = [np.zeros(0)], [np.zeros((0, scene.model.nv))]
-    for i, sole in enumerate(scene.robot.soles):
-        if not stance.planted[frame, i]:
-            continue
+def sole_error(scene: Scene, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (12,) of the feet in a frame [m, rad], and their derivative (12, nv)."""
+    data, errors = scene.at(frame), list[np.ndarray]()
+    rows: list[np.ndarray] = []
+    for sole, place, axes in zip(scene.robot.soles, *scene.standing_feet, strict=True):
         turn, back = np.empty(4), np.empty(4)
-        mujoco.mju_negQuat(back, stance.axes[frame, i])
+        mujoco.mju_negQuat(back, axes)
         mujoco.mju_mulQuat(turn, data.xquat[sole.body_id], back)
         tilt, jacobian = np.empty(3), np.empty((2, 3, scene.model.nv))
         mujoco.mju_quat2Vel(tilt, turn, 1.0)
         mujoco.mj_jacBody(scene.model, data, jacobian[0], jacobian[1], sole.body_id)
-        errors += [data.xpos[sole.body_id] - stance.places[frame, i], tilt]
+        errors += [data.xpos[sole.body_id] - place, tilt]
         rows += [jacobian[0], jacobian[1]]
     return np.concatenate(errors), np.concatenate(rows)
 
 
-def plant(scene: Scene, stance: Stance, frames: np.ndarray) -> None:
-    """Lead the planted soles of some frames (k,) to their places, by the shortest displacements."""
+def plant(scene: Scene, frames: np.ndarray) -> None:
+    """Lead the soles of some frames (k,) to their places, by the shortest displacements."""
     for frame in frames.tolist():
         for _ in range(NEWTON):
-            given = motions(scene, stance, frame).given
+            given = motions(scene, frame).given
             if np.abs(given).max() < CLOSE:
                 break
             scene.displace(frame, given)

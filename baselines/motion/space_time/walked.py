@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from poise.baselines.balance.references.reference_motion import COLUMNS, MOST_COMMANDS, faster
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
+from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts, over_ground
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
@@ -124,14 +124,10 @@ def _swings(commands: np.ndarray, h: float, omega: float) -> np.ndarray:
 
 def _run(clip: Clip, planted: np.ndarray) -> str:
     """What says that a clip runs; empty where it walks. Raises ConfigError where it jumps."""
-    flying = np.flatnonzero(~planted.any(axis=1))
-    flights = np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
-    longest = max(flights, key=len)
-    if len(longest) * clip.dt <= FLIGHT:
+    first, time = longest_flight(planted, clip.dt)
+    if time <= FLIGHT:
         return ""
-    says = (f"both feet are off the ground for {len(longest) * clip.dt:.2f} s at "
-            f"{longest[0] * clip.dt:.2f} s")  # fmt: skip
-    first = int(longest[0])
+    says = f"both feet are off the ground for {time:.2f} s at {first * clip.dt:.2f} s"
     if planted[max(first - round(TOGETHER / clip.dt), 0) : first].any(axis=0).all():
         raise ConfigError(says, source=clip.name, field="contacts")
     return f"{says}, so that it would be walked; "

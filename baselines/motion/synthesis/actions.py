@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.synthesis.scripts.printer import overlay_text
-from poise.baselines.motion.synthesis.scripts.tokens import wrong
 from poise.baselines.motion.synthesis.scripts.tree import (
     Arrow,
     ClipName,
@@ -16,7 +15,7 @@ from poise.baselines.motion.synthesis.scripts.tree import (
     StateName,
     Term,
 )
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import shown
 
 from .stage import Stage, changed, layer_of, overlaid
 
@@ -67,11 +66,11 @@ class Reader:
         start, goal = states[0], states[-1] if len(items) > 1 else None
         inner = items[start is not None : len(items) - (goal is not None)]
         if not inner:
-            raise self._wrong("a script needs a motion, not postures alone", 0)
-        if start is not None and inner[0][0].kind:
-            raise self._wrong("next to a posture no transition is chosen by hand", inner[0][0].at)
-        if goal is not None and items[-1][0].kind:
-            raise self._wrong("next to a posture no transition is chosen by hand", items[-1][0].at)
+            raise self.script.wrong("a script needs a motion, not postures alone", 0)
+        said = "next to a posture no transition is chosen by hand"
+        for state, arrow in ((start, inner[0][0]), (goal, items[-1][0])):
+            if state is not None and arrow.kind:
+                raise self.script.wrong(said, arrow.at)
         return replace(self._actions(inner), start=start, goal=goal)
 
     def _actions(self, items: list[Item]) -> Actions:
@@ -99,7 +98,7 @@ class Reader:
     def _counted(self, term: Term) -> None:
         self.count += 1
         if self.count > MOST_ACTIONS:
-            raise self._wrong(f"more than {MOST_ACTIONS} actions", term.at)
+            raise self.script.wrong(f"more than {MOST_ACTIONS} actions", term.at)
 
     def _body(self, term: Term, seen: int) -> tuple[ClipName | StateName | Sequence, int]:
         """What a term is, and how many definitions it sees: those before its own."""
@@ -119,10 +118,8 @@ class Reader:
         text = overlay_text(overlay)
         if text not in self.stage.derived:
             clip = self._overlaid(overlay, seen)
-            try:
+            with self.script.blamed(term.at):
                 self.stage.add(text, clip)
-            except ConfigError as error:
-                raise self._wrong(error.message, term.at) from None
         return text
 
     def _overlaid(self, overlay: Overlay, seen: int) -> Clip:
@@ -134,21 +131,16 @@ class Reader:
             over = tuple(m for m in term.modifiers if m.kind in OVER)
             layers.append(layer_of(self._clip(term, seen, OVER), over, self.script))
         at = overlay.terms[1].at
-        return self._planned(overlaid(base, layers, at, self.script), at)
-
-    def _planned(self, clip: Clip, at: int) -> Clip:
-        """A clip that has been changed; an error says where."""
-        try:
+        clip = overlaid(base, layers, at, self.script)
+        with self.script.blamed(at):
             return self.again(clip)
-        except ConfigError as error:
-            raise self._wrong(error.message, at) from None
 
     def _clip(self, term: Term, seen: int, skipped: tuple[str, ...]) -> Clip:
         """The clip of a term by itself, but for modifiers of the kinds `skipped`."""
         times, modifiers = _repeats(term)
         body, inner = self._body(term, seen)
         if isinstance(body, StateName):
-            raise self._wrong("a posture stands first or last, alone", term.at)
+            raise self.script.wrong("a posture stands first or last, alone", term.at)
         if times > 1 or isinstance(body, Sequence):
             once = body if isinstance(body, Sequence) else Sequence((Overlay((Term(body),)),))
             items = [item for _ in range(times) for item in self._flat(once, inner, Arrow())]
@@ -158,7 +150,8 @@ class Reader:
         for modifier in modifiers:
             if modifier.kind not in skipped:
                 clip = changed(clip, modifier, self.script)
-                clip = self._planned(clip, modifier.at) if modifier.kind == "@" else clip
+                with self.script.blamed(modifier.at):
+                    clip = self.again(clip) if modifier.kind == "@" else clip
         return clip
 
     def _found(self, body: ClipName) -> str:
@@ -166,11 +159,8 @@ class Reader:
         if name is None:
             names = [*(define.name for define in self.script.defines), *self.stage.packed,
                      *self.stage.others]  # fmt: skip
-            raise self._wrong(f"no motion {shown(body.name)}", body.at, names)
+            raise self.script.wrong(f"no motion {shown(body.name)}", body.at, names)
         return name
-
-    def _wrong(self, message: str, at: int, choices: list[str] | None = None) -> ConfigError:
-        return wrong(message, self.script.text, at, self.script.source, choices)
 
 
 def state_of(overlay: Overlay) -> StateName | None:

@@ -12,15 +12,12 @@ from poise.baselines.balance.references.robot_clip import FEWEST, About, RobotCl
 from poise.baselines.balance.references.stances import why_not_home
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.feasibility.check import FeasibilityLimits
-from poise.baselines.motion.feasibility.edges import Attempt, End
+from poise.baselines.motion.feasibility.curve import End, JoinPart, Refused
 from poise.baselines.motion.feasibility.physical import (
-    TIME_PRICE,
-    JoinPart,
     JoinRefused,
     direct_way,
     height_span,
     make_shaper,
-    part_of,
     pause,
     standing_end,
     ways_by_standing,
@@ -93,23 +90,16 @@ class RobotJoins:
         self, before: Clip, after: Clip, transition: Transition, through: bool = False
     ) -> str:
         """Why the robot cannot do a transition, or nothing; `through` standing if need be."""
-        if through and not self.refusal(before, after, transition):
-            return ""
-        key = (transition, through)
-        if key not in self._ways:
-            self._ways[key] = self._found(before, after, transition, through)
-        made = self._ways[key]
+        made = self._known(before, after, transition, through)
         return made if isinstance(made, str) else ""
 
     def way(self, before: Clip, after: Clip, transition: Transition) -> Way:
         """The way of a transition, direct if there is one; raises JoinRefused if there is none."""
-        for through in (False, True):
-            if (self.refusal(before, after, transition, through) == ""
-                    and isinstance(made := self._ways[transition, through], Way)):  # fmt: skip
-                return made
-        raise JoinRefused(f"no way from {before.name!r} at {transition.leave:.2f} s to "
-                          f"{after.name!r} at {transition.enter:.2f} s: "
-                          f"{self._ways[transition, True]}")  # fmt: skip
+        made = self._known(before, after, transition, through=True)
+        if isinstance(made, str):
+            raise JoinRefused(f"no way from {before.name!r} at {transition.leave:.2f} s to "
+                              f"{after.name!r} at {transition.enter:.2f} s: {made}")  # fmt: skip
+        return made
 
     def lead(self, clip: Clip, first: bool) -> Way | None:
         """The way from standing into a motion, or from it back; None where it needs none.
@@ -141,8 +131,15 @@ class RobotJoins:
         said = why_not_home(self.robot, qpos, clip.support.planted[frame])
         return f"at {frame * clip.dt:.2f} s of {clip.name!r} {said}"
 
+    def _known(self, before: Clip, after: Clip, transition: Transition, through: bool) -> Way | str:
+        """The way of a transition, or why there is none; looked for once."""
+        key = (transition, through)
+        if key not in self._ways:
+            self._ways[key] = self._found(before, after, transition, through)
+        return self._ways[key]
+
     def _found(self, before: Clip, after: Clip, transition: Transition, through: bool) -> Way | str:
-        direct = self._ways.get((transition, False)) if through else ""
+        direct = self._known(before, after, transition, False) if through else ""
         if isinstance(direct, Way):
             return direct
         sides = self._side(before, transition.leave), self._side(after, transition.enter)
@@ -154,21 +151,20 @@ class RobotJoins:
                 _end(shaper, b, transition.enter, entered=True))  # fmt: skip
         if not through:
             return self._direct(shaper, *ends)
-        found = ways_by_standing(shaper, *ends, TIME_PRICE)
+        found = ways_by_standing(shaper, *ends)
         if isinstance(found, str):
             return f"{direct}; {found}"
         return self._way(shaper, *ends, found)
 
     def _direct(self, shaper: Shaper, a: End, b: End) -> Way | str:
-        found = direct_way(shaper, a, b, TIME_PRICE)
-        return found.reason if found.qpos is None else self._way(shaper, a, b, (found,))
+        found = direct_way(shaper, a, b)
+        return found.reason if isinstance(found, Refused) else self._way(shaper, a, b, (found,))
 
-    def _way(self, shaper: Shaper, a: End, b: End, found: tuple[Attempt, ...]) -> Way:
-        inner = pause(shaper, [attempt.qpos for attempt in found if attempt.qpos is not None])
-        joints = np.vstack([a.q, *inner, b.q])
+    def _way(self, shaper: Shaper, a: End, b: End, parts: tuple[JoinPart, ...]) -> Way:
+        joints = np.vstack([a.q, *pause(shaper, parts), b.q])
         qpos = np.array([shaper.planted.placed(q) for q in joints])
         clip = clip_of_robot(self.robot, qpos, shaper.dt, "physical")
-        return Way(clip, tuple(part_of(shaper, attempt) for attempt in found))
+        return Way(clip, parts)
 
     @cached_property
     def _first_shaper(self) -> Shaper:

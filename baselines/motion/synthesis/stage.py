@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.skeleton import GROUPS
-from poise.baselines.motion.graphs.adjacency import Frames, end_to_begin, frames_of, with_clip
+from poise.baselines.motion.clips.link_groups import GROUPS
+from poise.baselines.motion.graphs.adjacency import end_to_begin, with_clip
+from poise.baselines.motion.graphs.frames import Frames, frames_of
 from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
 from poise.baselines.motion.graphs.motion_graph import GraphClip, MotionGraph, Transition
-from poise.baselines.motion.synthesis.scripts.tokens import wrong
 from poise.baselines.motion.synthesis.scripts.tree import Modifier, Script
 from poise.configs.errors import ConfigError, shown
 
@@ -77,7 +77,7 @@ class Stage:
 
 def changed(clip: Clip, modifier: Modifier, script: Script) -> Clip:
     """A clip after one modifier; an error says where the modifier stands."""
-    try:
+    with script.blamed(modifier.at):
         if modifier.kind == "[":
             clip = clip.cut(*modifier.numbers)
             if clip.support is not None and not clip.support.planted[[0, -1]].all():
@@ -87,10 +87,8 @@ def changed(clip: Clip, modifier: Modifier, script: Script) -> Clip:
             return clip.at_speed(modifier.numbers[0])
         if modifier.kind == "mirrored":  # on the same bones: sides may differ by a millimetre
             return replace(clip.mirrored(), skeleton=clip.skeleton)
-    except ConfigError as error:
-        raise wrong(error.message, script.text, modifier.at, script.source) from None
-    raise wrong(f'"{modifier.kind}" is for what lies over another motion: a | b '
-                f"{modifier.kind} …", script.text, modifier.at, script.source)  # fmt: skip
+    raise script.wrong(f'"{modifier.kind}" is for what lies over another motion: a | b '
+                       f"{modifier.kind} …", modifier.at)  # fmt: skip
 
 
 def layer_of(clip: Clip, modifiers: tuple[Modifier, ...], script: Script) -> Layer:
@@ -101,8 +99,7 @@ def layer_of(clip: Clip, modifiers: tuple[Modifier, ...], script: Script) -> Lay
             weight = modifier.numbers[0]
         for name in modifier.names:
             if name not in GROUPS:
-                raise wrong(f"no link group {shown(name)}", script.text, modifier.at,
-                            script.source, GROUPS)  # fmt: skip
+                raise script.wrong(f"no link group {shown(name)}", modifier.at, GROUPS)
             groups.append(GROUPS[name])
     return Layer(clip, tuple(groups), weight)
 
@@ -112,4 +109,4 @@ def overlaid(base: Clip, layers: list[Layer], at: int, script: Script) -> Clip:
     try:
         return overlay(base, layers)
     except ConfigError as error:
-        raise wrong(error.message, script.text, at, script.source, error.choices) from None
+        raise script.wrong(error.message, at, error.choices) from None

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from poise.baselines.motion.clips.clip import Clip, together
+from poise.baselines.motion.graphs.frames import nearest_places
 from poise.baselines.motion.graphs.joining.joins import JOINS, laid_on
 from poise.baselines.motion.graphs.motion_graph import (
     MotionGraph,
@@ -14,12 +15,10 @@ from poise.baselines.motion.graphs.motion_graph import (
     earliest_part,
     latest_part,
 )
-from poise.baselines.motion.graphs.nearest import nearest_places
 from poise.baselines.motion.graphs.paths import Path, Place, Step, Task
 from poise.baselines.motion.graphs.search import best_paths
 from poise.baselines.motion.retargeting.performed import planned_again
 from poise.baselines.motion.synthesis.scripts.printer import text_of
-from poise.baselines.motion.synthesis.scripts.tokens import wrong
 from poise.baselines.motion.synthesis.scripts.tree import Script, StateName
 from poise.configs.errors import ConfigError, shown
 
@@ -141,8 +140,8 @@ class Synthesis:
             if duration is not None:
                 said = "a physical transition lasts as long as the robot needs"
         if said:
-            raise wrong(said, script.text, arrow.at, script.source,
-                        self.kinds if said.startswith("no transition") else None)  # fmt: skip
+            choices = self.kinds if said.startswith("no transition") else None
+            raise script.wrong(said, arrow.at, choices)
         return made
 
     def _best_paths(self, task: Task, k: int) -> list[Path]:
@@ -169,14 +168,12 @@ class Synthesis:
         if place is None and (name := self.stage.find(state.name)) is not None:
             place = StatePlace(name)  # how the clip begins
         if place is None:
-            raise wrong(f"no posture {shown(state.name)}", script.text, state.at, script.source,
-                        [*states, *self.stage.packed])  # fmt: skip
+            raise script.wrong(f"no posture {shown(state.name)}", state.at,
+                               [*states, *self.stage.packed])  # fmt: skip
         posture = self.stage.posture(place.clip, place.time)
-        try:
+        with script.blamed(state.at):
             return nearest_places(self.stage.frames, posture,
                                   price=self.stage.graph.thresholds.time_price)  # fmt: skip
-        except ConfigError as error:
-            raise wrong(error.message, script.text, state.at, script.source) from None
 
     def _play(self, plan: Plan) -> tuple[Clip, list[Played]]:
         """The steps of the best path, one after the other."""

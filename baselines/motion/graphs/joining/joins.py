@@ -15,7 +15,7 @@ from poise.baselines.motion.clips.rotations import slerp
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 
-from .states import State, minus, plus, state_at, turned_rate, vector_rate
+from .states import State, minus, plus, quintic, state_at, turned_rate, vector_rate
 
 SHORTEST = 2  # frames of a transition
 
@@ -56,8 +56,8 @@ def hermite_curve(a: State, b: State, duration: float, order: int = 3) -> np.nda
         raise ConfigError(f"must be 3 or 5, not {order}", field="order", choices=(3, 5))
     gap = minus(b.root, b.rotations, a.root, a.rotations)
     start, end = duration * a.rate, duration * _vector_rates(gap, b.rate)
-    zero = np.zeros_like(gap)
     if order == 3:
+        zero = np.zeros_like(gap)
         return np.array([zero, start, 3.0 * gap - 2.0 * start - end, start + end - 2.0 * gap])
     # where H is no small angle the second derivative differs from the acceleration by the rate of
     # J_r, which is taken by a difference along the way
@@ -65,10 +65,7 @@ def hermite_curve(a: State, b: State, duration: float, order: int = 3) -> np.nda
     later = _vector_rates(gap + ahead * end / duration, b.rate + ahead * b.acceleration)
     bend_a = duration**2 * a.acceleration
     bend_b = duration * (duration * later - end) / ahead
-    c3 = 10.0 * gap - 6.0 * start - 4.0 * end - 1.5 * bend_a + 0.5 * bend_b
-    c4 = -15.0 * gap + 8.0 * start + 7.0 * end + 1.5 * bend_a - bend_b
-    c5 = 6.0 * gap - 3.0 * (start + end) + 0.5 * (bend_b - bend_a)
-    return np.array([zero, start, 0.5 * bend_a, c3, c4, c5])
+    return quintic(gap, start, end, bend_a, bend_b)
 
 
 def cross(before: Clip, after: Clip, duration: float, weight: str = "smooth") -> Clip:
@@ -171,8 +168,7 @@ def _prepared(before: Clip, after: Clip, duration: float, kind: str) -> tuple[Cl
 
     Raises ConfigError for two skeletons, and for a duration of fewer than 2 frames.
     """
-    ours, theirs = before.skeleton, after.skeleton
-    if ours.names != theirs.names or not np.allclose(ours.offsets, theirs.offsets, atol=1e-6):
+    if not before.skeleton.same_as(after.skeleton):
         raise ConfigError(f"{after.name!r} has another skeleton than {before.name!r}", field=kind)
     count = round(duration / before.dt)
     if count < SHORTEST:
@@ -214,10 +210,8 @@ def _offset(
     end: np.ndarray, rate: np.ndarray, bend: np.ndarray, own: State, span: float, u: np.ndarray
 ) -> np.ndarray:
     """(n, 3 + 3J) offsets from 0, at rest, to `end` with the seam's rate and acceleration."""
-    speed = span * _offset_rate(end, rate, own.rate)
+    speed, rest = span * _offset_rate(end, rate, own.rate), np.zeros_like(end)
     bent = span**2 * (bend - own.acceleration)
-    c3 = 10.0 * end - 4.0 * speed + 0.5 * bent
-    c4 = -15.0 * end + 7.0 * speed - bent
-    c5 = 6.0 * end - 3.0 * speed + 0.5 * bent
+    c3, c4, c5 = quintic(end, rest, speed, rest, bent)[3:]
     s = u[:, None]
     return s**3 * (c3 + s * (c4 + s * c5))

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.link_groups import GROUPS, LinkGroup
 from poise.baselines.motion.clips.rotations import IDENTITY, inverse, multiply, slerp
-from poise.baselines.motion.clips.skeleton import GROUPS, LinkGroup
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 

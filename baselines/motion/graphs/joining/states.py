@@ -41,6 +41,17 @@ def plus(
     return root + tangent[..., :3], multiply(rotations, exp(turns))
 
 
+def quintic(
+    gap: np.ndarray, start: np.ndarray, end: np.ndarray, bend_a: np.ndarray, bend_b: np.ndarray
+) -> np.ndarray:
+    """(6, n) coefficients in s, lowest power first, of the curve of the fifth order from 0 at s = 0
+    to `gap` (n,) at s = 1, with these first and second derivatives at both."""
+    c3 = 10.0 * gap - 6.0 * start - 4.0 * end - 1.5 * bend_a + 0.5 * bend_b
+    c4 = -15.0 * gap + 8.0 * start + 7.0 * end + 1.5 * bend_a - bend_b
+    c5 = 6.0 * gap - 3.0 * (start + end) + 0.5 * (bend_b - bend_a)
+    return np.array([np.zeros_like(gap), start, 0.5 * bend_a, c3, c4, c5])
+
+
 def vector_rate(turn: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """ḣ (…, 3) for which Exp(h) has angular velocities (…, 3) in body axes: J_r(h)⁻¹ ω.
 

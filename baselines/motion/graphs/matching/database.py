@@ -99,9 +99,7 @@ def _scales(raw: np.ndarray, weights: Mapping[str, float]) -> np.ndarray:
 def _check_skeletons(clips: Sequence[Clip]) -> None:
     if not clips:
         raise ConfigError("at least one is needed", field="clips")
-    first = clips[0].skeleton
     for clip in clips[1:]:
-        own = clip.skeleton
-        if own.names != first.names or not np.allclose(own.offsets, first.offsets, atol=1e-6):
+        if not clips[0].skeleton.same_as(clip.skeleton):
             raise ConfigError(f"{clip.name!r} has another skeleton than {clips[0].name!r}",
                               field="clips")  # fmt: skip

@@ -3,8 +3,7 @@
 import numpy as np
 from mujoco import minimize
 
-from .goals import Misses
-from .options import IkOptions
+from .goals import IkOptions, Misses
 from .prior import PosePrior
 
 FAR = 4.0 * np.pi  # [rad] from the start: the bound of joints without limits

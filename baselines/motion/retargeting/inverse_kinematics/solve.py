@@ -11,8 +11,7 @@ from poise.envs.robots.robot import Robot
 
 from .bounded import Objective, solve_bounded
 from .chain import Chain
-from .goals import IkGoal, Misses
-from .options import IkOptions, IkResult
+from .goals import IkGoal, IkOptions, IkResult, Misses
 from .prior import PosePrior
 from .steps import STEPS
 

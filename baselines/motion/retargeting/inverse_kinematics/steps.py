@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .goals import Misses
-from .options import IkOptions
+from .goals import IkOptions, Misses
 
 RANK = 1e-9  # of the largest singular value: smaller ones are rounding
 

@@ -1,1 +1,1 @@
-"""What a user may ask of a motion besides the clip, a file each."""
+"""What a user may ask of a motion besides the clip."""

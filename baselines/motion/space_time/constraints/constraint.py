@@ -1,17 +1,22 @@
-"""What a constraint is, rows of the whole clip begun where the motion is now; when it holds."""
+"""What a constraint is: rows of the whole clip, begun where the motion is now; when it holds; and
+constraints in a YAML file."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from poise.configs.errors import ConfigError
+from poise.configs.files import resolve
 from poise.configs.kinds import OfKind
+from poise.configs.schema import build, read_yaml
 
 from .scene import Rows, Scene
 
 PERIOD = "period"
+MOST = 100  # constraints of a file
 
 
 @dataclass(frozen=True)
@@ -144,3 +149,35 @@ def violation(constraint: Constraint, scene: Scene) -> Violation:
     time = float(scene.times[max(rows[worst].parts)])
     return Violation(constraint.about(), largest, time, constraint.unit,
                      largest <= constraint.tolerance)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _File:
+    constraints: tuple[Constraint, ...]
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.constraints) <= MOST:
+            raise ValueError(f"must be 1 to {MOST} constraints, not {len(self.constraints)}")
+
+
+def read_constraints(file: str | Path) -> tuple[Constraint, ...]:
+    """The constraints of a packaged name or a path to a ``.yaml`` file.
+
+    Raises:
+        ConfigError: no such file; an unknown kind or field, a value out of range. The text names
+            the file, the field and the valid choices.
+    """
+    path = resolve("constraints", file)
+    return build(_File, read_yaml(path), path).constraints
+
+
+def check_constraints(
+    constraints: Sequence[Constraint], scene: Scene, source: str | Path | None
+) -> None:
+    """Raise ConfigError for a point that the robot lacks, or a period that the clip lacks."""
+    for i, constraint in enumerate(constraints):
+        try:
+            constraint.all_rows(scene)
+        except ConfigError as error:
+            raise ConfigError(error.message, source=source, field=f"constraints[{i}].{error.field}",
+                              choices=error.choices) from None  # fmt: skip

@@ -6,10 +6,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from poise.baselines.motion.retargeting.limbs import Difference
 from poise.configs.errors import ConfigError
 
 from .constraint import Constraint
-from .scene import Difference, Rows, Scene
+from .scene import Rows, Scene
 
 LINES = {"hips": "hip", "shoulders": "shoulder"}
 

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from poise.baselines.motion.retargeting.limbs import Limbs, Point, sole_corners
+from poise.baselines.motion.retargeting.limbs import (
+    Difference,
+    Limbs,
+    Placed,
+    Point,
+    sole_corners,
+)
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 SIDES = ("left", "right")
 COM = "com"
-
-
-class Placed(Protocol):
-    """What has a place in a posture."""
-
-    def place(self, data: mujoco.MjData) -> np.ndarray:
-        """(3,) in the world [m]."""
-
-    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """(3, nv) of its velocity by the generalized velocity."""
 
 
 class CentreOfMass(NamedTuple):
@@ -41,21 +37,6 @@ class CentreOfMass(NamedTuple):
         jacobian = np.empty((3, model.nv))
         mujoco.mj_jacSubtreeCom(model, data, jacobian, self.root)
         return jacobian
-
-
-class Difference(NamedTuple):
-    """One point as seen from another, in the world's axes."""
-
-    point: Placed
-    origin: Placed
-
-    def place(self, data: mujoco.MjData) -> np.ndarray:
-        """(3,) [m]."""
-        return self.point.place(data) - self.origin.place(data)
-
-    def jacobian(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """(3, nv)."""
-        return self.point.jacobian(model, data) - self.origin.jacobian(model, data)
 
 
 class Rows(NamedTuple):
@@ -93,6 +74,8 @@ class Scene:
         planted: (F, 2) by the order of the robot's soles.
         planted_corners: (F, 2, k, 3) where their corners are to be while planted [m]: where the
             robot stands, unless others are set. A sole of fewer corners has its last one again.
+        standing_feet: (2, 3) places [m] and (2, 4) orientations, wxyz, of the feet's bodies as the
+            robot stands.
         sides: the index of the left and the right sole.
     """
 
@@ -108,6 +91,8 @@ class Scene:
         self.duration = float(self.times[-1 - before])
         self._at = -1
         self.see(robot.standing_qpos)
+        feet = [sole.body_id for sole in robot.soles]
+        self.standing_feet = self.data.xpos[feet], self.data.xquat[feet]
         order = np.argsort([-self.data.xpos[sole.body_id][1] for sole in robot.soles])
         self.sides = dict(zip(SIDES, order.tolist(), strict=True))
         padded = np.array([self.padded_corners(i) for i in range(len(robot.soles))])

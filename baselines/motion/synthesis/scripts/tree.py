@@ -18,8 +18,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal
+
+from poise.configs.errors import ConfigError
+
+from .tokens import wrong
 
 KINDS = ("insert", "cross", "capture", "inertial", "physical")
 OPTIONS = ("duration",)  # the first is the one without a name
@@ -116,6 +122,18 @@ class Script:
     sequence: Sequence
     text: str = field(default="", compare=False)
     source: str = field(default="script", compare=False)
+
+    def wrong(self, message: str, at: int, choices: Iterable[object] | None = None) -> ConfigError:
+        """The error of a place in it, with line and column."""
+        return wrong(message, self.text, at, self.source, choices)
+
+    @contextmanager
+    def blamed(self, at: int) -> Iterator[None]:
+        """What raises ConfigError inside says line and column of this place instead."""
+        try:
+            yield
+        except ConfigError as error:
+            raise self.wrong(error.message, at) from None
 
 
 def clip_names(script: Script) -> set[str]:

@@ -5,8 +5,9 @@ import pytest
 
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.clips.link_groups import GROUPS, LinkGroup
 from poise.baselines.motion.clips.roles import ROLES, find_roles
-from poise.baselines.motion.clips.skeleton import GROUPS, LinkGroup, Skeleton
+from poise.baselines.motion.clips.skeleton import Skeleton
 from poise.configs.errors import ConfigError
 
 FAMILIES = {

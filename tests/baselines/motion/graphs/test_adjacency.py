@@ -12,13 +12,12 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.graphs.adjacency import (
-    all_rates,
     end_to_begin,
-    frames_of,
     make_graph,
     transitions_between,
     with_clip,
 )
+from poise.baselines.motion.graphs.frames import all_rates, frames_of
 from poise.baselines.motion.graphs.joining.coefficient import (
     best_duration,
     coefficient,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
-from poise.baselines.motion.clips.skeleton import GROUPS
+from poise.baselines.motion.clips.link_groups import GROUPS
 from poise.baselines.motion.retargeting.robot_bvh import clip_of_robot, robot_qpos
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot

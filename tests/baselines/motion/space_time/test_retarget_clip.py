@@ -11,17 +11,9 @@ from poise.baselines.balance.references.robot_clip import reference_from
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.retargeting.retarget import targets_on
-from poise.baselines.motion.space_time.asked import Asked, soles_over_floor
-from poise.baselines.motion.space_time.constraints.constraint import Constraint, When, violation
-from poise.baselines.motion.space_time.constraints.height import Height
-from poise.baselines.motion.space_time.constraints.keep import Keep
-from poise.baselines.motion.space_time.constraints.reach import Reach
-from poise.baselines.motion.space_time.constraints.scene import Scene
-from poise.baselines.motion.space_time.problem import Problem
+from poise.baselines.motion.space_time.constraints.constraint import Constraint, When
+from poise.baselines.motion.space_time.constraints.points import Height, Keep, Reach
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, Solver, retarget_clip
-from poise.baselines.motion.space_time.solve import optimise
-from poise.baselines.motion.space_time.stance import standing_stance
 from poise.configs.errors import ConfigError
 from tests.support.captured import captured
 from tests.support.physics import robot_named
@@ -86,31 +78,6 @@ def test_what_cannot_be_is_missed_by_little_and_said() -> None:
     (only,) = found.quality.violations
     assert not only.holds and 1.0 < only.largest < 2.3 and only.time == pytest.approx(0.3, abs=0.02)
     assert found.quality.sole_error < 1e-6 and found.quality.limit_excess == 0.0
-
-
-def test_a_foot_that_is_not_planted_is_lifted() -> None:
-    """The seam for steps: planted soles are data; the other one is free but for the floor."""
-    robot = robot_named("humanoid")
-    limbs, targets, _ = targets_on(clip(), robot, smooth=3.0, lead=LEAD, planted=False)
-    planted = np.ones((len(targets), 2), dtype=bool)
-    scene = Scene(robot, limbs, made("frame", False).clip.qpos, 1 / 30, LEAD, planted)
-    left = scene.sides["left"]
-    planted[11:26, left] = False
-    stance = standing_stance(scene)._replace(planted=planted)
-    lift = (Height(point="ankle_left", least=0.15, period=(0.25, 0.3)),)
-    assert violation(lift[0], scene).largest > 0.05
-    optimise(Problem(scene, Asked(scene, targets, lift), stance, lift, 2.0))
-    assert violation(lift[0], scene).largest < 5e-3
-    corners = [scene.corners(left) for f in range(len(scene)) for _ in [scene.at(f)]]
-    heights = np.array([each[:, 2].min() for each in corners])
-    assert heights.min() > -1e-3 and heights[16:20].max() > 0.02
-    assert np.abs(heights[~np.isin(np.arange(len(scene)), np.arange(11, 26))]).max() < 1e-6
-    right = 1 - left
-    for frame in range(len(scene)):
-        scene.at(frame)
-        off = scene.corners(right) - scene.planted_corners[frame, right]
-        assert np.abs(off).max() < 1e-6
-    assert soles_over_floor(scene, stance, 5) == []
 
 
 def test_bad_arguments() -> None:

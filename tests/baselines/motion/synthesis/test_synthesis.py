@@ -13,13 +13,13 @@ import pytest
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.clips.link_groups import GROUPS
 from poise.baselines.motion.clips.rotations import angle_between
-from poise.baselines.motion.clips.skeleton import GROUPS
-from poise.baselines.motion.graphs.adjacency import frames_of, make_graph
+from poise.baselines.motion.graphs.adjacency import make_graph
+from poise.baselines.motion.graphs.frames import frames_of, nearest_places
 from poise.baselines.motion.graphs.joining.joins import JOINS
 from poise.baselines.motion.graphs.moments import strong_clips
 from poise.baselines.motion.graphs.motion_graph import GraphClip, MotionGraph, StatePlace
-from poise.baselines.motion.graphs.nearest import nearest_places
 from poise.baselines.motion.synthesis.scripts.library import between, find_script, packaged_scripts
 from poise.baselines.motion.synthesis.scripts.parser import parse
 from poise.baselines.motion.synthesis.synthesis import Synthesis

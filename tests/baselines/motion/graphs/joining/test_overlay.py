@@ -8,8 +8,8 @@ import pytest
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.clips.link_groups import GROUPS, LinkGroup
 from poise.baselines.motion.clips.rotations import angle_between
-from poise.baselines.motion.clips.skeleton import GROUPS, LinkGroup
 from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease

@@ -7,8 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.baselines.motion.retargeting.inverse_kinematics.goals import IkGoal
-from poise.baselines.motion.retargeting.inverse_kinematics.options import IkOptions
+from poise.baselines.motion.retargeting.inverse_kinematics.goals import IkGoal, IkOptions
 from poise.baselines.motion.retargeting.inverse_kinematics.prior import PosePrior
 from poise.baselines.motion.retargeting.inverse_kinematics.solve import (
     METHODS,

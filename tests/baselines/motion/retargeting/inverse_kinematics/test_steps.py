@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.motion.retargeting.inverse_kinematics.chain import Chain
-from poise.baselines.motion.retargeting.inverse_kinematics.goals import IkGoal, Misses
-from poise.baselines.motion.retargeting.inverse_kinematics.options import IkOptions
+from poise.baselines.motion.retargeting.inverse_kinematics.goals import IkGoal, IkOptions, Misses
 from poise.baselines.motion.retargeting.inverse_kinematics.steps import (
     ccd_step,
     damped_step,

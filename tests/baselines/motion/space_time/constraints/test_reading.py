@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from poise.baselines.motion.space_time.constraints.constraint import When
-from poise.baselines.motion.space_time.constraints.reach import Reach
-from poise.baselines.motion.space_time.constraints.reading import (
+from poise.baselines.motion.space_time.constraints.constraint import (
+    When,
     check_constraints,
     read_constraints,
 )
+from poise.baselines.motion.space_time.constraints.points import Reach
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from tests.support.scenes import swaying

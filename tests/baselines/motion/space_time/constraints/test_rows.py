@@ -6,15 +6,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.baselines.motion.space_time.constraints.apart import Apart
 from poise.baselines.motion.space_time.constraints.constraint import Constraint, violation
 from poise.baselines.motion.space_time.constraints.heading import Heading
-from poise.baselines.motion.space_time.constraints.height import Height
-from poise.baselines.motion.space_time.constraints.keep import Keep
-from poise.baselines.motion.space_time.constraints.over_support import OverSupport
-from poise.baselines.motion.space_time.constraints.reach import Reach
+from poise.baselines.motion.space_time.constraints.points import (
+    Apart,
+    Height,
+    Keep,
+    OverSupport,
+    Reach,
+    Speed,
+)
 from poise.baselines.motion.space_time.constraints.scene import Rows, Scene
-from poise.baselines.motion.space_time.constraints.speed import Speed
 from poise.baselines.motion.space_time.constraints.touch import Touch
 from tests.support.scenes import swaying
 
