@@ -1,7 +1,9 @@
-"""The curriculum of a training run: pushes, and errors of the robot, that grow."""
+"""What changes on a schedule in a training run: pushes, errors of the robot, and exploration."""
 
 from dataclasses import replace
 
+import torch
+from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from poise.configs.errors import ConfigError
@@ -51,6 +53,32 @@ class CurriculumCallback(BaseCallback):
         spread = [(i + 0.5) / n if curriculum.mixed else 1.0 for i in range(n)]
         levels = self.levels or [self.config.env.realism]
         return [levels[i % len(levels)].scaled(factor * spread[i]) for i in range(n)]
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class ExplorationCallback(BaseCallback):
+    """Narrows the exploration in time, where `ppo.log_std_final` asks for it.
+
+    The deterministic policy is what counts in the end: with little noise left, what is learned
+    is what is judged.
+    """
+
+    model: PPO
+
+    def __init__(self, config: TrainConfig):
+        super().__init__()
+        self.config = config
+
+    def _on_rollout_start(self) -> None:
+        ppo = self.config.ppo
+        if ppo.log_std_final is None:
+            return
+        done = min(self.num_timesteps / self.config.steps, 1.0)
+        log_std = ppo.log_std_init + done * (ppo.log_std_final - ppo.log_std_init)
+        with torch.no_grad():
+            self.model.policy.log_std.fill_(log_std)
 
     def _on_step(self) -> bool:
         return True

@@ -32,14 +32,16 @@ from poise.training.running.stopping import keeps
 from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
 from .checkpoints import restore
 from .config import TrainConfig
-from .curriculum import CurriculumCallback, curriculum_levels
-from .exploration import ExplorationCallback, shape_exploration
+from .curriculum import CurriculumCallback, ExplorationCallback, curriculum_levels
 from .imported import import_policy
 from .policy import locate_policy
 from .policy_files import BEST, CONFIG, LAST, STATE, check_controller, find_checkpoint
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 
+#: fields of `PPOConfig` that SB3's PPO takes as they are
+AS_CALLED = ("n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "clip_range", "ent_coef",
+             "vf_coef", "max_grad_norm", "target_kl", "use_sde", "sde_sample_freq")  # fmt: skip
 MAY_CHANGE = ("steps", "threads", "keep_every")  # of a configuration that a run goes on with
 
 
@@ -78,7 +80,7 @@ def train(
     curriculum_levels(config)  # refused before anything is compiled
     torch.set_num_threads(1)
     resolve("robots", config.robot)
-    if config.action not in ("torque", "position"):  # else nothing of the controllers is called
+    if config.controlled:  # else nothing of the controllers is called
         controller_config(config.controller)  # refused before anything is compiled
         prepare()
     with ExitStack() as stack:
@@ -152,19 +154,8 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     model = PPO(
         MirroredPolicy if ppo.symmetric else "MlpPolicy",
         env,
-        n_steps=ppo.n_steps,
-        batch_size=ppo.batch_size,
-        n_epochs=ppo.n_epochs,
         learning_rate=learning_rate,
-        gamma=ppo.gamma,
-        gae_lambda=ppo.gae_lambda,
-        clip_range=ppo.clip_range,
-        ent_coef=ppo.ent_coef,
-        vf_coef=ppo.vf_coef,
-        max_grad_norm=ppo.max_grad_norm,
-        target_kl=ppo.target_kl,
-        use_sde=ppo.use_sde,
-        sde_sample_freq=ppo.sde_sample_freq,
+        **{name: getattr(ppo, name) for name in AS_CALLED},
         policy_kwargs=policy,
         seed=config.seed,
         device="cpu",
@@ -174,8 +165,6 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         blind_actor(model.policy, _seen(env))
     if ppo.actor_rate < 1.0:
         slow_actor(model.policy, ppo.actor_rate)
-    if ppo.noise_correlation > 0.0 or ppo.noise_until is not None:
-        shape_exploration(model.policy, ppo.noise_correlation)
     head = model.policy.action_net
     assert isinstance(head, torch.nn.Linear)
     with torch.no_grad():
