@@ -14,8 +14,7 @@ from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
 from poise.training.learning.tuning.search import tune
-from poise.training.learning.tuning.tasks import TuneConfig
-from poise.training.learning.tuning.tasks import TuningPushes
+from poise.training.learning.tuning.tasks import TuneConfig, TuningPushes
 from poise.training.running.folder_lock import HOLDER, FolderLock
 from tests.support.shared import tiny_config
 

@@ -18,9 +18,9 @@ from poise.training.running.summary import (
     EnvelopeFigures,
     Fractions,
     RobotFigures,
-    ScenarioFigures,
     Sector,
 )
+from poise.training.running.trial_figures import ScenarioFigures
 
 from .factors import eurobench_figures, factor_figures
 from .levels import level_figures

@@ -24,7 +24,7 @@ from poise.training.motion.following.repertoire import (
     kept,
     load_repertoire,
 )
-from poise.training.running.summary import InMotion, Interval, MotionLevel, MotionMeans
+from poise.training.running.trial_figures import InMotion, Interval, MotionLevel, MotionMeans
 
 from .played import Played, part, pushes, ratio, won
 

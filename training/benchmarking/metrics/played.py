@@ -10,7 +10,8 @@ from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.running.summary import Counts, Interval, Rate, both_ends
+from poise.training.running.summary import both_ends
+from poise.training.running.trial_figures import Counts, Interval, Rate
 
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
 RATED = ("mix", "motions")  # parts that the counts are of, where a suite has one
