@@ -24,7 +24,13 @@ def curriculum_levels(config: TrainConfig) -> list[Realism]:
 
 
 class CurriculumCallback(BaseCallback):
-    """Scales the training environments' largest push and level of realism as the run goes on."""
+    """Scales what grows or narrows as the run goes on: pushes, errors of the robot, exploration.
+
+    The deterministic policy is what counts in the end: with little noise left (`log_std_final` of
+    PPO), what is learned is what is judged.
+    """
+
+    model: PPO
 
     def __init__(self, config: TrainConfig):
         super().__init__()
@@ -32,7 +38,7 @@ class CurriculumCallback(BaseCallback):
         self.levels = curriculum_levels(config)
 
     def _on_rollout_start(self) -> None:
-        curriculum, env = self.config.curriculum, self.config.env
+        curriculum, env, ppo = self.config.curriculum, self.config.env, self.config.ppo
         growing = curriculum.share * self.config.steps
         done = min(self.num_timesteps / growing, 1.0) if growing else 1.0
         if env.pushes is not None and growing:
@@ -46,6 +52,11 @@ class CurriculumCallback(BaseCallback):
             for i, level in enumerate(self._levels(factor)):
                 self.training_env.set_attr("realism", level, indices=i)
             self.logger.record("curriculum/realism", factor)
+        if ppo.log_std_final is not None:
+            done = min(self.num_timesteps / self.config.steps, 1.0)
+            log_std = ppo.log_std_init + done * (ppo.log_std_final - ppo.log_std_init)
+            with torch.no_grad():
+                self.model.policy.log_std.fill_(log_std)
 
     def _levels(self, factor: float) -> list[Realism]:
         """The level of each environment, `factor` of the way from `ideal`."""
@@ -53,32 +64,6 @@ class CurriculumCallback(BaseCallback):
         spread = [(i + 0.5) / n if curriculum.mixed else 1.0 for i in range(n)]
         levels = self.levels or [self.config.env.realism]
         return [levels[i % len(levels)].scaled(factor * spread[i]) for i in range(n)]
-
-    def _on_step(self) -> bool:
-        return True
-
-
-class ExplorationCallback(BaseCallback):
-    """Narrows the exploration in time, where `ppo.log_std_final` asks for it.
-
-    The deterministic policy is what counts in the end: with little noise left, what is learned
-    is what is judged.
-    """
-
-    model: PPO
-
-    def __init__(self, config: TrainConfig):
-        super().__init__()
-        self.config = config
-
-    def _on_rollout_start(self) -> None:
-        ppo = self.config.ppo
-        if ppo.log_std_final is None:
-            return
-        done = min(self.num_timesteps / self.config.steps, 1.0)
-        log_std = ppo.log_std_init + done * (ppo.log_std_final - ppo.log_std_init)
-        with torch.no_grad():
-            self.model.policy.log_std.fill_(log_std)
 
     def _on_step(self) -> bool:
         return True

@@ -29,10 +29,10 @@ from poise.envs.robots.variants import coarser_robot
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
-from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
+from .callbacks import Checkpoints, Progress, RolloutLog
 from .checkpoints import restore
 from .config import TrainConfig
-from .curriculum import CurriculumCallback, ExplorationCallback, curriculum_levels
+from .curriculum import CurriculumCallback, curriculum_levels
 from .imported import import_policy
 from .policy import locate_policy
 from .policy_files import BEST, CONFIG, LAST, STATE, check_controller, find_checkpoint
@@ -107,9 +107,8 @@ def train(
         model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
         checkpoints = Checkpoints(config, robot, out, state)
         stack.callback(checkpoints.close)
-        schedules = [CurriculumCallback(config), ExplorationCallback(config)]
         given = [callback] if isinstance(callback, BaseCallback) else list(callback)
-        callbacks = [Throughput(), RewardTerms(), *schedules, checkpoints, *given]
+        callbacks = [RolloutLog(), CurriculumCallback(config), checkpoints, *given]
         bar = Progress(config.steps)
         stack.callback(bar.close)
         if progress:
@@ -224,11 +223,10 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
         robot = coarser_robot(robot, config.physics_step)
     env = config.make_training_env(robot)
     check_pushes(config, env)
-    moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(config.replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
-    if moments is not None:
-        normalize.obs_rms = moments
+    if config.ppo.symmetric:
+        normalize.obs_rms = MirroredMeanStd(env.mirrors()[0])
     return normalize
 
 

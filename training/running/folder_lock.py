@@ -11,7 +11,6 @@ import shlex
 import socket
 import sys
 from pathlib import Path
-from types import TracebackType
 
 from poise.configs.errors import PoiseError
 
@@ -22,7 +21,7 @@ ARRAY = "SLURM_ARRAY_TASK_ID"
 NO_LOCKS = (errno.EBADF, errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
-class FolderLock:
+class FolderLock(contextlib.AbstractContextManager):
     """Holds a folder until `release`, or the end of the process; also as a context.
 
     The folder is made if missing, and an empty one that it has made goes again. The system keeps
@@ -68,12 +67,7 @@ class FolderLock:
                 print(f"poise: {self.path}: the file system has no locks ({second.strerror}): see "
                       "to it that no other run writes there", file=sys.stderr)  # fmt: skip
 
-    def __enter__(self) -> FolderLock:
-        return self
-
-    def __exit__(
-        self, kind: type | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.release()
 
     def release(self) -> None:
