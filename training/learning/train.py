@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.robots.variants import coarser_robot
-from poise.training.running.folder_lock import FolderLock
+from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.stopping import keeps
 
 from .callbacks import Checkpoints, Progress, RolloutLog
@@ -260,23 +259,15 @@ def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
         raise ConfigError("must be a name in UTF-8: TensorBoard takes no other", source=out,
                           field="out") from None  # fmt: skip
     checkpoint = find_checkpoint(out / LAST)
-    if not resume:
-        if checkpoint is not None:
-            raise ConfigError(
-                "already holds a training run; go on with --resume or choose another folder",
-                source=str(out),
-                field="out",
-            )
-        return None
+    check_resume(out, resume, checkpoint is not None, "a training run", "run")
     if checkpoint is None:
-        raise ConfigError("holds no run to resume", source=str(out), field="resume")
+        return None
     before = build(TrainConfig, read_yaml(checkpoint / CONFIG), str(checkpoint / CONFIG))
-    same = replace(before, **{name: getattr(config, name) for name in MAY_CHANGE})
-    if same != config:
-        different = [
-            name for name in TrainConfig.__dataclass_fields__
-            if getattr(same, name) != getattr(config, name)
-        ]  # fmt: skip
+    different = [
+        name for name in TrainConfig.__dataclass_fields__
+        if name not in MAY_CHANGE and getattr(before, name) != getattr(config, name)
+    ]  # fmt: skip
+    if different:
         raise ConfigError(
             f"the run was started with another configuration ({', '.join(different)})",
             source=str(checkpoint / CONFIG),

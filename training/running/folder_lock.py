@@ -1,4 +1,4 @@
-"""One process at a time writes to a folder: two would lose each other's trials."""
+"""A folder that is written to: by one process at a time, and only anew or with --resume."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import socket
 import sys
 from pathlib import Path
 
-from poise.configs.errors import PoiseError
+from poise.configs.errors import ConfigError, PoiseError
 
 HOLDER = ".poise.lock"  # who holds the lock: of a process that was killed it says nothing
 #: of the environment: the number of a run among several of one command
@@ -85,6 +85,18 @@ class FolderLock(contextlib.AbstractContextManager):
     def __del__(self) -> None:
         if self._file >= 0:
             self.release()
+
+
+def check_resume(out: Path, resume: bool, there: bool, held: str, kind: str) -> None:
+    """Raise ConfigError unless `resume` is asked for exactly where there is something to go on with.
+
+    `held` and `kind` name that, such as "a training run" and "run".
+    """
+    if there and not resume:
+        raise ConfigError(f"already holds {held}; go on with --resume or choose another folder",
+                          source=out, field="out")  # fmt: skip
+    if resume and not there:
+        raise ConfigError(f"holds no {kind} to resume", source=out, field="resume")
 
 
 def _of_array() -> str:

@@ -75,7 +75,7 @@ def card(
 
 
 def _template() -> jinja2.Template:
-    """The page. Markdown is not escaped: what a stranger may have written passes `plain`, `code`."""
+    """The page. Nothing is escaped: what a stranger may have written passes `plain` or `code`."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("poise.training.deploy.export", "templates"),
         undefined=jinja2.StrictUndefined,

@@ -21,7 +21,7 @@ from poise.training.learning.curriculum import curriculum_levels
 from poise.training.learning.policy_files import CONFIG, LAST, find_checkpoint
 from poise.training.learning.train import check_folder, check_pushes, train
 from poise.training.running.executor import Executor, check_backend
-from poise.training.running.folder_lock import FolderLock
+from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.provenance import circumstances
 from poise.training.running.stopping import keeps
 
@@ -146,11 +146,7 @@ def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
         raise ConfigError("holds the run of a single seed; choose another folder",
                           source=out, field="out")  # fmt: skip
     there = [int(entry["seed"]) for entry in read_seeds(out)] if (out / SEEDS).exists() else []
-    if there and not resume:
-        raise ConfigError("already holds training runs; go on with --resume or choose another "
-                          "folder", source=out, field="out")  # fmt: skip
-    if resume and not there:
-        raise ConfigError("holds no runs to resume", source=out, field="resume")
+    check_resume(out, resume, bool(there), "training runs", "runs")
     if not (there or seeds):
         raise ConfigError("give at least one", field="seeds")
     return there + [seed for seed in seeds if seed not in there]

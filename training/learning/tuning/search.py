@@ -21,7 +21,7 @@ from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.robots.robot import load_robot
 from poise.training.running.executor import Executor
-from poise.training.running.folder_lock import FolderLock
+from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.stopping import keeps
 
 from .candidates import Candidate, check_walks, follow, play
@@ -113,15 +113,9 @@ def tune(
 
 def _known(config: TuneConfig, out: Path, resume: bool) -> list[Generation]:
     """The generations that an earlier call has tried."""
-    if not is_file(out / CONFIG):
-        if resume:
-            raise ConfigError("holds no search to resume", source=out, field="resume")
-        return []
+    check_resume(out, resume, is_file(out / CONFIG), "a search", "search")
     if not resume:
-        raise ConfigError(
-            "already holds a search; go on with --resume or choose another folder",
-            source=out, field="out",
-        )  # fmt: skip
+        return []
     before = to_dict(build(TuneConfig, read_yaml(out / CONFIG), out / CONFIG))
     for name, value in to_dict(config).items():
         if name != "generations" and before[name] != value:
