@@ -88,7 +88,7 @@ class FolderLock(contextlib.AbstractContextManager):
 
 
 def check_resume(out: Path, resume: bool, there: bool, held: str, kind: str) -> None:
-    """Raise ConfigError unless `resume` is asked for exactly where there is something to go on with.
+    """Raise ConfigError unless `resume` says whether there is something to go on with.
 
     `held` and `kind` name that, such as "a training run" and "run".
     """
