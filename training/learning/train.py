@@ -225,7 +225,8 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
     vec = ThreadedVecEnv(config.replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
     if config.ppo.symmetric:
-        normalize.obs_rms = MirroredMeanStd(env.mirrors()[0])
+        moments: Any = MirroredMeanStd(env.mirrors()[0])  # SB3's types say a mapping
+        normalize.obs_rms = moments
     return normalize
 
 
