@@ -48,7 +48,8 @@ from poise.training.learning.train import train
 from poise.training.learning.tuning.candidates import Candidate
 from poise.training.learning.tuning.candidates import play as play_candidate
 from poise.training.learning.tuning.gains import Gains
-from poise.training.learning.tuning.search import TuneConfig, tune, tune_config
+from poise.training.learning.tuning.search import tune, tune_config
+from poise.training.learning.tuning.tasks import TuneConfig
 from poise.training.pictures.report import page
 from poise.training.pictures.report.page import write_report
 from poise.training.pictures.view.view import view, view_trial
@@ -103,7 +104,8 @@ def _tuning(g: Ground, name: str) -> str:
 def _tuned(g: Ground, name: str) -> None:
     """A candidate's mapping, as a search hands it to a process."""
     candidate = {"kind": "outside", "name": name}
-    play_candidate(Candidate(0, "humanoid", candidate, 1.0, False, (object(),)))
+    config = TuneConfig("momentum-qp", {"com.weight": (0.1, 1.0)})
+    play_candidate(Candidate(0, config, candidate, (object(),)))
 
 
 def _once(make: Callable[[Ground, str], Path], folder: str) -> Callable[[Ground, str], Path]:

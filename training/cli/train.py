@@ -20,7 +20,7 @@ from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.statistics.differences import difference
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.learning.config import TrainConfig, train_config
-from poise.training.learning.policy_files import BEST, LAST, STATE, find_checkpoint, read_state
+from poise.training.learning.policy_files import BEST, last_state
 from poise.training.learning.seeds.records import SEEDS, Evaluation, evaluations, start_and_best
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
@@ -116,12 +116,10 @@ def run(args: Sequence[str]) -> None:
 
 def last_words(config: TrainConfig, out: Path) -> list[str]:
     """What was recovered of the held-out pushes, and the commands that come next."""
-    checkpoint = find_checkpoint(out / LAST)
-    rows = [] if checkpoint is None else read_state(checkpoint / STATE)["evaluations"]
-    start, best = start_and_best(rows)
+    start, best = start_and_best(last_state(out)["evaluations"])
     if start is None or best is None:
         return []
-    of_what = config.start_from or (config.controller if controls(config) else "the first policy")
+    of_what = config.start_from or (config.controller if config.controlled else "the first policy")
     measured = (
         f"of {config.evaluation.trials} held-out pushes recovered: {start['recovered']:.1%} by "
         f"{of_what}, {best['recovered']:.1%} by {out / BEST} (at step {best['timesteps']:,})"
@@ -146,7 +144,7 @@ def next_commands(config: TrainConfig, out: Path, shown: Path) -> list[str]:
     """How to measure what was trained into `out` on pushes of its own, and how to look at it."""
     robot = [] if config.robot == HUMANOID else ["--robot", config.robot]
     allow = [word for name in named(config.controller) for word in ("--allow", name)]
-    names = [config.controller, str(out)] if controls(config) else [str(out)]
+    names = [config.controller, str(out)] if config.controlled else [str(out)]
     suite = ["--suite", "walk-push"] if config.action == "walk" else []
     to = ["--out", str(Path("out") / out.name)]
     return [
@@ -155,15 +153,9 @@ def next_commands(config: TrainConfig, out: Path, shown: Path) -> list[str]:
     ]
 
 
-def controls(config: TrainConfig) -> bool:
-    """Whether a controller is below the policy."""
-    return config.action not in ("torque", "position")
-
-
 def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
     """Say where a run ends, if that is not at `config.steps`."""
-    checkpoint = find_checkpoint(out / LAST) if resume else None
-    done = 0 if checkpoint is None else int(read_state(checkpoint / STATE)["timesteps"])
+    done = last_state(out)["timesteps"] if resume else 0
     if done >= config.steps:
         return f"{out} has {done:,} steps already; --steps says how many it is to have"
     rollout = config.ppo.n_envs * config.ppo.n_steps

@@ -24,14 +24,16 @@ from .policy_files import BEST, KEPT, LAST, controller_fingerprint
 from .vec_env import ThreadedVecEnv
 
 
-class Throughput(BaseCallback):
-    """Logs steps per second and the update's fraction of the time."""
+class RolloutLog(BaseCallback):
+    """Logs of each rollout: steps per second, the update's fraction of the time, and the means of
+    the reward's weighted terms over its policy steps."""
 
     model: PPO
 
     def __init__(self) -> None:
         super().__init__()
         self._rollout_start = self._rollout_end = time.perf_counter()
+        self._sum, self._steps = np.zeros(len(REWARD_TERMS)), 0
 
     def _on_rollout_start(self) -> None:
         now = time.perf_counter()
@@ -42,20 +44,6 @@ class Throughput(BaseCallback):
             self.logger.record("time/update_share", update / (rollout + update))
         self._rollout_start = now
 
-    def _on_rollout_end(self) -> None:
-        self._rollout_end = time.perf_counter()
-
-    def _on_step(self) -> bool:
-        return True
-
-
-class RewardTerms(BaseCallback):
-    """Logs the weighted terms of the reward, means over the policy steps of a rollout."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._sum, self._steps = np.zeros(len(REWARD_TERMS)), 0
-
     def _on_step(self) -> bool:
         envs = self.training_env.unwrapped
         assert isinstance(envs, ThreadedVecEnv)
@@ -64,6 +52,7 @@ class RewardTerms(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
+        self._rollout_end = time.perf_counter()
         means = self._sum / max(self._steps, 1)
         for name, mean in zip(REWARD_TERMS, means, strict=True):
             if mean != 0.0:

@@ -57,10 +57,6 @@ class PPOConfig:
         log_std_init: Logarithm of the exploration's standard deviation at the start.
         log_std_final: The same at the end of the run, linear in time in between; None: it is
             learned.
-        noise_correlation: Correlation of the exploration's noise in successive steps; 0: white, see
-            `exploration.py`.
-        noise_until: Time of an episode [s] after which actions have no noise, so that rest is seen;
-            None: they always have.
         use_sde: Explore by noise that is smooth in the state, as SB3's gSDE.
         sde_sample_freq: Policy steps after which that noise is drawn anew; -1: once a rollout.
         symmetric: Make the policy its own mirror image, see `symmetry.py`: each push teaches two.
@@ -85,10 +81,6 @@ class PPOConfig:
     activation: Literal["tanh", "elu"] = field(default="tanh", metadata={"omit": "default"})
     log_std_init: float = -1.5
     log_std_final: float | None = None
-    noise_correlation: float = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.99, "omit": "default"}
-    )
-    noise_until: float | None = field(default=None, metadata={"above": 0.0, "omit": "default"})
     use_sde: bool = False
     sde_sample_freq: int = field(default=16, metadata={"min": -1})
     symmetric: bool = False
@@ -96,10 +88,6 @@ class PPOConfig:
     def __post_init__(self):
         if self.symmetric and self.use_sde:
             raise ValueError("symmetric: not with use_sde")
-        if self.noise_correlation > 0.0 and self.use_sde:
-            raise ValueError("noise_correlation: not with use_sde, whose noise lasts already")
-        if self.noise_until is not None and self.use_sde:
-            raise ValueError("noise_until: not with use_sde")
         if self.n_envs * self.n_steps < 2:
             raise ValueError("n_envs × n_steps must be at least 2")
         if self.n_envs * self.n_steps > MOST_STEPS:
@@ -212,6 +200,11 @@ class TrainConfig:
     ppo: PPOConfig = field(default_factory=PPOConfig)
     curriculum: Curriculum = field(default_factory=Curriculum)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+
+    @property
+    def controlled(self) -> bool:
+        """Whether a controller is below the policy."""
+        return self.action not in ("torque", "position")
 
     def make_training_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
         """As `make_env`, with the terms that the critic alone sees: `observation.privileged`."""

@@ -1,7 +1,9 @@
-"""The curriculum of a training run: pushes, and errors of the robot, that grow."""
+"""What changes on a schedule in a training run: pushes, errors of the robot, and exploration."""
 
 from dataclasses import replace
 
+import torch
+from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from poise.configs.errors import ConfigError
@@ -22,7 +24,13 @@ def curriculum_levels(config: TrainConfig) -> list[Realism]:
 
 
 class CurriculumCallback(BaseCallback):
-    """Scales the training environments' largest push and level of realism as the run goes on."""
+    """Scales what grows or narrows as the run goes on: pushes, errors of the robot, exploration.
+
+    The deterministic policy is what counts in the end: with little noise left (`log_std_final` of
+    PPO), what is learned is what is judged.
+    """
+
+    model: PPO
 
     def __init__(self, config: TrainConfig):
         super().__init__()
@@ -30,7 +38,7 @@ class CurriculumCallback(BaseCallback):
         self.levels = curriculum_levels(config)
 
     def _on_rollout_start(self) -> None:
-        curriculum, env = self.config.curriculum, self.config.env
+        curriculum, env, ppo = self.config.curriculum, self.config.env, self.config.ppo
         growing = curriculum.share * self.config.steps
         done = min(self.num_timesteps / growing, 1.0) if growing else 1.0
         if env.pushes is not None and growing:
@@ -44,6 +52,11 @@ class CurriculumCallback(BaseCallback):
             for i, level in enumerate(self._levels(factor)):
                 self.training_env.set_attr("realism", level, indices=i)
             self.logger.record("curriculum/realism", factor)
+        if ppo.log_std_final is not None:
+            done = min(self.num_timesteps / self.config.steps, 1.0)
+            log_std = ppo.log_std_init + done * (ppo.log_std_final - ppo.log_std_init)
+            with torch.no_grad():
+                self.model.policy.log_std.fill_(log_std)
 
     def _levels(self, factor: float) -> list[Realism]:
         """The level of each environment, `factor` of the way from `ideal`."""

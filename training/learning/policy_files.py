@@ -86,7 +86,7 @@ def controller_fingerprint(config: TrainConfig) -> str:
     Which other one takes its place where state and robot are uncertain does not count: the gains
     that are learned on stay as they are.
     """
-    if config.action in ("torque", "position"):
+    if not config.controlled:
         return ""
     below = controller_config(config.controller)
     if isinstance(below, CaptureStepConfig):
@@ -102,6 +102,13 @@ def read_state(path: Path) -> dict[str, Any]:
         raise ConfigError(f"must be a whole number from 0 to {STEPS:.0e}", source=path,
                           field="timesteps")  # fmt: skip
     return state
+
+
+def last_state(run: Path) -> dict[str, Any]:
+    """What the last checkpoint of a run's folder says; 0 `timesteps` as long as there is none."""
+    checkpoint = find_checkpoint(run / LAST)
+    begun = {} if checkpoint is None else read_state(checkpoint / STATE)
+    return {"timesteps": 0, "evaluations": [], **begun}
 
 
 def read_statistics(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,20 +25,22 @@ from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.robots.variants import coarser_robot
-from poise.training.running.folder_lock import FolderLock
+from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.stopping import keeps
 
-from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
+from .callbacks import Checkpoints, Progress, RolloutLog
 from .checkpoints import restore
 from .config import TrainConfig
 from .curriculum import CurriculumCallback, curriculum_levels
-from .exploration import ExplorationCallback, shape_exploration
 from .imported import import_policy
 from .policy import locate_policy
 from .policy_files import BEST, CONFIG, LAST, STATE, check_controller, find_checkpoint
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 
+#: fields of `PPOConfig` that SB3's PPO takes as they are
+AS_CALLED = ("n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "clip_range", "ent_coef",
+             "vf_coef", "max_grad_norm", "target_kl", "use_sde", "sde_sample_freq")  # fmt: skip
 MAY_CHANGE = ("steps", "threads", "keep_every")  # of a configuration that a run goes on with
 
 
@@ -78,7 +79,7 @@ def train(
     curriculum_levels(config)  # refused before anything is compiled
     torch.set_num_threads(1)
     resolve("robots", config.robot)
-    if config.action not in ("torque", "position"):  # else nothing of the controllers is called
+    if config.controlled:  # else nothing of the controllers is called
         controller_config(config.controller)  # refused before anything is compiled
         prepare()
     with ExitStack() as stack:
@@ -105,9 +106,8 @@ def train(
         model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
         checkpoints = Checkpoints(config, robot, out, state)
         stack.callback(checkpoints.close)
-        schedules = [CurriculumCallback(config), ExplorationCallback(config)]
         given = [callback] if isinstance(callback, BaseCallback) else list(callback)
-        callbacks = [Throughput(), RewardTerms(), *schedules, checkpoints, *given]
+        callbacks = [RolloutLog(), CurriculumCallback(config), checkpoints, *given]
         bar = Progress(config.steps)
         stack.callback(bar.close)
         if progress:
@@ -152,19 +152,8 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     model = PPO(
         MirroredPolicy if ppo.symmetric else "MlpPolicy",
         env,
-        n_steps=ppo.n_steps,
-        batch_size=ppo.batch_size,
-        n_epochs=ppo.n_epochs,
         learning_rate=learning_rate,
-        gamma=ppo.gamma,
-        gae_lambda=ppo.gae_lambda,
-        clip_range=ppo.clip_range,
-        ent_coef=ppo.ent_coef,
-        vf_coef=ppo.vf_coef,
-        max_grad_norm=ppo.max_grad_norm,
-        target_kl=ppo.target_kl,
-        use_sde=ppo.use_sde,
-        sde_sample_freq=ppo.sde_sample_freq,
+        **{name: getattr(ppo, name) for name in AS_CALLED},
         policy_kwargs=policy,
         seed=config.seed,
         device="cpu",
@@ -174,8 +163,6 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         blind_actor(model.policy, _seen(env))
     if ppo.actor_rate < 1.0:
         slow_actor(model.policy, ppo.actor_rate)
-    if ppo.noise_correlation > 0.0 or ppo.noise_until is not None:
-        shape_exploration(model.policy, ppo.noise_correlation)
     head = model.policy.action_net
     assert isinstance(head, torch.nn.Linear)
     with torch.no_grad():
@@ -235,10 +222,10 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
         robot = coarser_robot(robot, config.physics_step)
     env = config.make_training_env(robot)
     check_pushes(config, env)
-    moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(config.replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
-    if moments is not None:
+    if config.ppo.symmetric:
+        moments: Any = MirroredMeanStd(env.mirrors()[0])  # SB3's types say a mapping
         normalize.obs_rms = moments
     return normalize
 
@@ -273,23 +260,15 @@ def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
         raise ConfigError("must be a name in UTF-8: TensorBoard takes no other", source=out,
                           field="out") from None  # fmt: skip
     checkpoint = find_checkpoint(out / LAST)
-    if not resume:
-        if checkpoint is not None:
-            raise ConfigError(
-                "already holds a training run; go on with --resume or choose another folder",
-                source=str(out),
-                field="out",
-            )
-        return None
+    check_resume(out, resume, checkpoint is not None, "a training run", "run")
     if checkpoint is None:
-        raise ConfigError("holds no run to resume", source=str(out), field="resume")
+        return None
     before = build(TrainConfig, read_yaml(checkpoint / CONFIG), str(checkpoint / CONFIG))
-    same = replace(before, **{name: getattr(config, name) for name in MAY_CHANGE})
-    if same != config:
-        different = [
-            name for name in TrainConfig.__dataclass_fields__
-            if getattr(same, name) != getattr(config, name)
-        ]  # fmt: skip
+    different = [
+        name for name in TrainConfig.__dataclass_fields__
+        if name not in MAY_CHANGE and getattr(before, name) != getattr(config, name)
+    ]  # fmt: skip
+    if different:
         raise ConfigError(
             f"the run was started with another configuration ({', '.join(different)})",
             source=str(checkpoint / CONFIG),

@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from .summary import Interval
+from .trial_figures import Interval
 
 NONE = "–"
 #: what a figure is only a bound of, or whether it is one from below → before it
@@ -110,8 +110,7 @@ J50_MEAN = Figure("j50_mean", "mean J50", ".1f", "N·s",
                   ends="j50_mean_ci95")  # fmt: skip
 J50_PER_MASS = Figure("j50_mean_per_mass", "J50/m", ".3f", "N·s/kg",
                       "the same over the robot's mass", csv="j50_per_mass")  # fmt: skip
-J50_WORST = Figure("j50_min", "worst J50", ".1f", "N·s", "in the worst direction",
-                   csv="j50_worst")  # fmt: skip
+J50_WORST = Figure("j50_min", "worst J50", ".1f", "N·s", "in the worst direction", csv="j50_worst")
 J50_BOUNDED = Figure("j50_bounded", "bounds", ".0f", words="directions where J50 is only a bound",
                      csv="j50_bounds", where=_some("j50_bounded"))  # fmt: skip
 ETA_MEAN = Figure("eta_mean", "η mean", ".2f", words="J50 over the ankle limit, mean of all",
@@ -191,12 +190,8 @@ PAIRED = (
     Figure("neither", "neither", ".0f"),
 )
 AGAINST = (
-    Figure(
-        "lost", "lost", ".0f", words="trials that what it is compared with recovers, and this not"
-    ),
-    Figure(
-        "won", "won", ".0f", words="trials that this recovers, and what it is compared with not"
-    ),
+    Figure("lost", "lost", ".0f", words="trials that the other one recovers, and this not"),
+    Figure("won", "won", ".0f", words="trials that this recovers, and the other one not"),
 )
 LOST_WON = Figure("only_a", "lost, won", ".0f", beside="only_b",
                   words="of the trials that both played")  # fmt: skip

@@ -1,4 +1,4 @@
-"""One process at a time writes to a folder: two would lose each other's trials."""
+"""A folder that is written to: by one process at a time, and only anew or with --resume."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import shlex
 import socket
 import sys
 from pathlib import Path
-from types import TracebackType
 
-from poise.configs.errors import PoiseError
+from poise.configs.errors import ConfigError, PoiseError
 
 HOLDER = ".poise.lock"  # who holds the lock: of a process that was killed it says nothing
 #: of the environment: the number of a run among several of one command
@@ -22,7 +21,7 @@ ARRAY = "SLURM_ARRAY_TASK_ID"
 NO_LOCKS = (errno.EBADF, errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
-class FolderLock:
+class FolderLock(contextlib.AbstractContextManager):
     """Holds a folder until `release`, or the end of the process; also as a context.
 
     The folder is made if missing, and an empty one that it has made goes again. The system keeps
@@ -68,12 +67,7 @@ class FolderLock:
                 print(f"poise: {self.path}: the file system has no locks ({second.strerror}): see "
                       "to it that no other run writes there", file=sys.stderr)  # fmt: skip
 
-    def __enter__(self) -> FolderLock:
-        return self
-
-    def __exit__(
-        self, kind: type | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.release()
 
     def release(self) -> None:
@@ -91,6 +85,18 @@ class FolderLock:
     def __del__(self) -> None:
         if self._file >= 0:
             self.release()
+
+
+def check_resume(out: Path, resume: bool, there: bool, held: str, kind: str) -> None:
+    """Raise ConfigError unless `resume` says whether there is something to go on with.
+
+    `held` and `kind` name that, such as "a training run" and "run".
+    """
+    if there and not resume:
+        raise ConfigError(f"already holds {held}; go on with --resume or choose another folder",
+                          source=out, field="out")  # fmt: skip
+    if resume and not there:
+        raise ConfigError(f"holds no {kind} to resume", source=out, field="resume")
 
 
 def _of_array() -> str:

@@ -13,6 +13,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TaskID,
     TextColumn,
     TimeRemainingColumn,
@@ -105,28 +106,19 @@ class ProgressLines(Progress):
 
 def progress_bar(console: Console) -> Progress:
     """A bar, or lines, with trials, recovery rates (its field `rates`) and the time left."""
-    return ProgressLines(
-        TextColumn("trials"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("recovered: {task.fields[rates]}", markup=False),
-        TimeRemainingColumn(),
-        console=console,
-        disable=console.quiet,
-    )
+    rates = TextColumn("recovered: {task.fields[rates]}", markup=False)
+    return _bar("trials", [MofNCompleteColumn(), rates], console)
 
 
 def steps_bar(label: str, console: Console | None = None) -> ProgressLines:
     """A bar, or lines, with steps of a training, rates (its field `rate`) and the time left."""
-    return ProgressLines(
-        TextColumn(label),
-        BarColumn(),
-        TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=console is not None and console.quiet,
-    )
+    steps = TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps")
+    return _bar(label, [steps, TextColumn("{task.fields[rate]}")], console)
+
+
+def _bar(label: str, told: list[ProgressColumn], console: Console | None) -> ProgressLines:
+    columns = (TextColumn(label), BarColumn(), *told, TimeRemainingColumn())
+    return ProgressLines(*columns, console=console, disable=console is not None and console.quiet)
 
 
 def print_paths(paths: Sequence[Path], console: Console) -> None:

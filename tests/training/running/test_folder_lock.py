@@ -13,8 +13,8 @@ from poise.configs.errors import PoiseError
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
-from poise.training.learning.tuning.search import TuneConfig, tune
-from poise.training.learning.tuning.tasks import TuningPushes
+from poise.training.learning.tuning.search import tune
+from poise.training.learning.tuning.tasks import TuneConfig, TuningPushes
 from poise.training.running.folder_lock import HOLDER, FolderLock
 from tests.support.shared import tiny_config
 

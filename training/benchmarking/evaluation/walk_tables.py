@@ -20,8 +20,9 @@ from poise.training.running.columns import (
     TRIED,
     known,
 )
-from poise.training.running.summary import ScenarioFigures, Summary
+from poise.training.running.summary import Summary
 from poise.training.running.tables import figure_table, text_table
+from poise.training.running.trial_figures import ScenarioFigures
 
 ALL = "all"  # motions of a suite
 MEAN = "mean of the motions"

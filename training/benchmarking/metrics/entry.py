@@ -24,9 +24,9 @@ from poise.training.running.summary import (
     Fractions,
     RealismLevel,
     RobotFigures,
-    ScenarioFigures,
     Sector,
 )
+from poise.training.running.trial_figures import ScenarioFigures
 
 from .factors import eurobench_figures, factor_figures
 from .motions import in_motion, motion_levels

@@ -21,7 +21,7 @@ from poise.training.motion.following.repertoire import (
     kept,
     load_repertoire,
 )
-from poise.training.running.summary import InMotion, MotionLevel, MotionMeans
+from poise.training.running.trial_figures import InMotion, MotionLevel, MotionMeans
 
 from .played import Played, cells, fitted, part, pushes, won
 

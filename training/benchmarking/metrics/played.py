@@ -14,7 +14,7 @@ from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.running.summary import Counts, Rate
+from poise.training.running.trial_figures import Counts, Rate
 
 Key = TypeVar("Key")
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers

@@ -13,13 +13,8 @@ from poise.training.benchmarking.statistics.rates import (
 )
 from poise.training.benchmarking.suites.walking import WALKING
 from poise.training.benchmarking.trials.trial import Outcome
-from poise.training.running.summary import (
-    EnvelopeFigures,
-    PhaseJ50,
-    StepsAsTold,
-    WalkLevel,
-    WalkMeans,
-)
+from poise.training.running.summary import EnvelopeFigures
+from poise.training.running.trial_figures import PhaseJ50, StepsAsTold, WalkLevel, WalkMeans
 
 from .played import Played, cells, part, rate
 

@@ -12,7 +12,8 @@ from poise.training.benchmarking.evaluation.folder import Settings
 from poise.training.benchmarking.metrics.pairs import counted
 from poise.training.benchmarking.statistics.differences import difference
 from poise.training.running.columns import ETA_MEAN, J50_MEAN, RECOVERED
-from poise.training.running.summary import Entry, Interval, Level, Rate, both_ends
+from poise.training.running.summary import Entry, Level, both_ends
+from poise.training.running.trial_figures import Interval, Rate
 
 from .read import Results, load_results
 

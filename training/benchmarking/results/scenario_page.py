@@ -9,7 +9,8 @@ from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.evaluation.walk_tables import scenario_cell, scenario_names
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.running.columns import CHATTER, ENERGY, NONE, SPEED, STEPS_TAKEN
-from poise.training.running.summary import Entry, ScenarioFigures, Summary
+from poise.training.running.summary import Entry, Summary
+from poise.training.running.trial_figures import ScenarioFigures
 
 from .pages import Table, check_alike, page_of
 

@@ -8,7 +8,8 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import is_file, read_json
 from poise.configs.schema import checked
 from poise.configs.texts import check_shown
-from poise.training.running.summary import Rate, Summary, check_format
+from poise.training.running.summary import Summary, check_format
+from poise.training.running.trial_figures import Rate
 
 #: keys of an entry that are there together or not at all
 ENTRY = (

@@ -17,7 +17,8 @@ from poise.training.running.columns import (
     NONE,
     STEPS,
 )
-from poise.training.running.summary import Entry, Summary, WalkLevel
+from poise.training.running.summary import Entry, Summary
+from poise.training.running.trial_figures import WalkLevel
 
 from .pages import Table, check_alike, direction_table, page_of
 

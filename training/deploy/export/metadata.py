@@ -4,7 +4,7 @@ Words are mjlab's where it has one, see `policy_files/metadata.py`: lists have c
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -42,28 +42,25 @@ class Action:
 
 def actions(env: BalanceEnv) -> list[Action]:
     """The entries of the environment's action, in order."""
-    residual: list[Action] = []
-    if isinstance(env, ResidualBalanceEnv):
-        scales = env.residual.entries()
-        residual = [
-            Action(name, scale, UNITS[name.rsplit("_", 1)[0]])
-            for name, scale in scales.items()
-            if scale > 0.0
-        ]
-    motors = env.robot.motor_names
+    limits = np.array(env.robot.torque_limit)
+    if isinstance(env, PositionBalanceEnv):
+        return _motors(env, env.servos.reach, "rad")
+    if not isinstance(env, ResidualBalanceEnv):
+        return _motors(env, limits, "N·m")
+    residual = [
+        Action(name, scale, UNITS[name.rsplit("_", 1)[0]])
+        for name, scale in env.residual.entries().items()
+        if scale > 0.0
+    ]
     if isinstance(env, ResidualWholeEnv):
         authority = Action("authority", 2.0, "1, within 0 and 1")
-        return [*residual, *_motors(motors, env.servos.reach, "rad"), authority]
-    if isinstance(env, ResidualBalanceEnv):
-        added = env.residual.torque
-        limits = added * np.array(env.robot.torque_limit)
-        return [*residual, *(_motors(motors, limits, "N·m") if added > 0.0 else [])]
-    if isinstance(env, PositionBalanceEnv):
-        return _motors(motors, env.servos.reach, "rad")
-    return _motors(motors, env.robot.torque_limit, "N·m")
+        return [*residual, *_motors(env, env.servos.reach, "rad"), authority]
+    added = env.residual.torque
+    return [*residual, *(_motors(env, added * limits, "N·m") if added > 0.0 else [])]
 
 
-def _motors(names: Sequence[str], scales: np.ndarray, unit: str) -> list[Action]:
+def _motors(env: BalanceEnv, scales: np.ndarray, unit: str) -> list[Action]:
+    names = env.robot.motor_names
     return [Action(name, float(scale), unit) for name, scale in zip(names, scales, strict=True)]
 
 

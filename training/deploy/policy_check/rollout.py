@@ -93,27 +93,26 @@ def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
     """Each term of the observation, at the first place of each age."""
     (places,) = policy.observer.places().values()
     for place in places:
-        shown = rollout.observations[:, place.start : place.start + place.size]
         where = f"{place.term.term} at {place.start}:{place.start + place.size}"
         if place.age:
             where += f", {place.age} steps ago"
-        yield _judged(where, place, shown, policy, rollout)
+        yield Finding(where, *_judged(place, policy, rollout))
 
 
-def _judged(
-    where: str, place: Place, shown: np.ndarray, policy: PolicyFile, rollout: Rollout
-) -> Finding:
+def _judged(place: Place, policy: PolicyFile, rollout: Rollout) -> tuple[bool | None, str]:
+    """Whether a term is right, and what was found of it."""
+    observed = rollout.observations[place.age + 1 :]
+    shown = observed[:, place.start : place.start + place.size]
     expected = _expected(place, policy, rollout)
     if expected is not None and len(expected):
-        found = _compared(where, expected, shown[place.age + 1 :])
-        other = None if found.right else _lies(expected, rollout.observations[place.age + 1 :])
-        text = found.text if other is None else f"lies at {other}:{other + place.size}"
-        return Finding(where, found.right, text)
+        right, text = _compared(expected, shown)
+        other = None if right else _lies(expected, observed)
+        return right, text if other is None else f"lies at {other}:{other + place.size}"
     if meaning(place.term) == "projected_gravity":
-        lengths = np.linalg.norm(shown[place.age + 1 :] / np.array(place.term.scale), axis=1)
+        lengths = np.linalg.norm(shown / np.array(place.term.scale), axis=1)
         worst = float(np.max(np.abs(lengths - 1.0)))
-        return Finding(where, worst < UNIT, f"its length is 1 within {worst:.1g}")
-    return Finding(where, None, "cannot be told without states (qpos, qvel)")
+        return worst < UNIT, f"its length is 1 within {worst:.1g}"
+    return None, "cannot be told without states (qpos, qvel)"
 
 
 def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray | None:
@@ -150,19 +149,19 @@ def _lies(expected: np.ndarray, observations: np.ndarray) -> int | None:
     return None
 
 
-def _compared(where: str, expected: np.ndarray, shown: np.ndarray) -> Finding:
-    """Two histories of a term; where they differ, by which factor or place."""
+def _compared(expected: np.ndarray, shown: np.ndarray) -> tuple[bool, str]:
+    """Whether two histories of a term are the same; where they differ, by which factor or place."""
     worst = float(np.max(np.abs(expected - shown)))
     if worst <= CLOSE:
-        return Finding(where, True, f"differs by {worst:.1g} at most")
+        return True, f"differs by {worst:.1g} at most"
     size = float(np.sum(expected * expected))
     factor = float(np.sum(expected * shown)) / size if size > 0.0 else 0.0
     if np.max(np.abs(factor * expected - shown)) <= CLOSE:
-        return Finding(where, False, f"is {factor:.3g} times what is described: its scale?")
+        return False, f"is {factor:.3g} times what is described: its scale?"
     order = _order(expected, shown)
     if order is not None:
-        return Finding(where, False, f"has another order: {order}")
-    return Finding(where, False, f"differs by {worst:.2g}: another term, place or zero?")
+        return False, f"has another order: {order}"
+    return False, f"differs by {worst:.2g}: another term, place or zero?"
 
 
 def _order(expected: np.ndarray, shown: np.ndarray) -> list[int] | None:

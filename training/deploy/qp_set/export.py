@@ -7,6 +7,7 @@ or up to the fall.
 import io
 import json
 from collections.abc import Iterator, Mapping
+from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,7 +29,7 @@ from poise.training.running.provenance import commit, versions
 from .recordings import PUSH_DURATION, RecordedTick, Recovery, recoveries
 
 Form = Literal["reduced", "full"]
-Manifest = dict[str, Any]  # manifest.json; see `README` for what it says
+Manifest = dict[str, Any]  # manifest.json; templates/README.md has what it says
 PER_TRIAL = 25  # problems
 LIBRARIES = ("mujoco", "numpy", "numba", "scipy")
 
@@ -119,7 +120,8 @@ def write_qp_set(
     }  # fmt: skip
     with new_folder(out) as part:
         _write_problems(part, manifest, recoveries(body, controller, limits, seed), writer)
-        (part / "README.md").write_text(README, "utf-8")
+        readme = resources.files(__package__) / "templates" / "README.md"
+        (part / "README.md").write_text(readme.read_text("utf-8"), "utf-8")
         (part / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", "utf-8")
     return manifest
 
@@ -156,46 +158,3 @@ def npz(arrays: Mapping[str, np.ndarray | None]) -> bytes:
     plain: dict[str, Any] = {name: np.array(array) for name, array in arrays.items()}
     np.savez_compressed(content, **plain)
     return content.getvalue()
-
-
-README = """\
-# Whole-body QPs from push recoveries
-
-Inverse-dynamics problems that a balance controller met, tick by tick, while a simulated humanoid
-was pushed: written by `poise qp-set`. manifest.json says with which robot, controller, pushes,
-seed, commit and versions.
-
-Each qpNNNNN.npz is a file of `qpsolvers.Problem`, as qpbenchmark reads it:
-
-    import qpsolvers
-
-    problem = qpsolvers.Problem.load("qp00000.npz")
-    x = qpsolvers.solve_problem(problem, solver="daqp").x
-
-    minimise   ½ xᵀPx + qᵀx   subject to   Gx ≤ h,  Ax = b,  lb ≤ x ≤ ub
-
-P is positive definite. What a problem has none of (A, b, lb, ub of the reduced form) is None.
-The same file holds how joint torques τ [N·m] follow from x, and what the controller answered:
-
-    import numpy as np
-
-    data = np.load("qp00000.npz", allow_pickle=True)  # allow_pickle: for what is None
-    torques = data["torque_matrix"] @ x + data["torque_offset"]
-    error = np.abs(torques - data["torques"]) / data["torque_limit"]  # fraction of the limits
-
-Two forms (`form` in the manifest) of the same problem, with the same torques:
-
-- full: x = (v̇, w), the accelerations (root: linear in the world's axes, angular in the body's;
-  then the joints) and the wrench of each sole (force [N], moment [N·m], world axes). A: the six
-  root rows of the dynamics and the soles that do not accelerate. G: wrench cones, torque limits.
-  lb, ub: accelerations that let joints stop before their limits.
-- reduced: both sets of equalities eliminated. x holds coordinates of the accelerations that leave
-  the soles at rest, and of the wrenches that cancel between them. Dense, inequalities only.
-
-A soft root adds its wrench (force, moment about the centre of mass) at the end of x.
-
-In the manifest, `trials` lists every push (impulse [N·s]; direction [°], counter-clockwise from
-forward), how it ended, the ticks met in its first two seconds and those that had a solution: the
-others, where joint limits contradict the rest, are left out. `problems` gives for each file its
-trial, the time after the push began [s] and the number of rows that are active at the solution.
-"""

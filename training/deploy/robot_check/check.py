@@ -13,14 +13,13 @@ from poise.training.running.files import plain
 
 from .dynamics import Dynamics, dynamics
 from .faults import Fault, find_faults
-from .physics_faults import unlike_the_file, unrest
 from .standing.holding import Holding, holding
 from .standing.one_leg import one_leg_qpos
 from .standing.posture import PostureFigures, posture_figures
 from .standing.rest import Rest, stand_at_rest
 from .standing.stability import DirectionFigures, by_direction
 from .touching import SelfContact, self_contacts, sole_contacts
-from .uses import STEPPING, Uses, controllers_for
+from .uses import Uses, controllers_for
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,6 @@ class RobotCheck:
         rest: two seconds at rest with momentum-qp.
         notes: what was changed of the model so that it can be played.
         controllers: "in place" and "stepping" → which packaged ones take the robot.
-        faults: what will go wrong.
     """
 
     name: str
@@ -80,7 +78,11 @@ class RobotCheck:
     rest: Rest
     notes: tuple[str, ...]
     controllers: dict[str, Uses]
-    faults: tuple[Fault, ...]
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """What will go wrong."""
+        return tuple(find_faults(self))
 
     @property
     def in_place(self) -> float:
@@ -94,19 +96,14 @@ class RobotCheck:
 
     def to_json(self) -> dict[str, Any]:
         """Plain lists and numbers, None for what is not finite."""
-        return plain(asdict(self) | {"in_place": self.in_place, "one_step": self.one_step})
+        means = {"in_place": self.in_place, "one_step": self.one_step}
+        return plain(asdict(self) | {"faults": self.faults, **means})
 
 
 def check_robot(robot: Robot | str | Path) -> RobotCheck:
     """Check a robot, by its name or description; raises ConfigError as `load_robot`."""
     robot = robot if isinstance(robot, Robot) else load_robot(robot)
     names = [robot.joint_names[dof - 6] for dof in robot.motor_dofs]
-    legs, touching, contacts = find_legs(robot), self_contacts(robot), sole_contacts(robot)
-    both = holding(robot, robot.standing_qpos, range(len(robot.soles)))
-    one = {sole.name: _on_one_foot(robot, i) for i, sole in enumerate(robot.soles)}
-    directions, uses = by_direction(PushLimits(robot)), controllers_for(robot)
-    never_step = uses[STEPPING].never_step
-    model, rest = dynamics(robot), stand_at_rest(robot)
     return RobotCheck(
         name=robot.name,
         fingerprint=robot.fingerprint,
@@ -125,22 +122,17 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
             )
             for sole in robot.soles
         ),
-        legs=legs,
+        legs=find_legs(robot),
         posture=posture_figures(robot),
-        both_feet=both,
-        one_foot=one,
-        sole_contacts=contacts,
-        self_contacts=touching,
-        directions=directions,
-        dynamics=model,
-        rest=rest,
+        both_feet=holding(robot, robot.standing_qpos, range(len(robot.soles))),
+        one_foot={sole.name: _on_one_foot(robot, i) for i, sole in enumerate(robot.soles)},
+        sole_contacts=sole_contacts(robot),
+        self_contacts=self_contacts(robot),
+        directions=by_direction(PushLimits(robot)),
+        dynamics=dynamics(robot),
+        rest=stand_at_rest(robot),
         notes=robot.notes,
-        controllers=uses,
-        faults=(
-            *unlike_the_file(robot.notes, model),
-            *find_faults(legs, touching, contacts, both, one, directions, never_step),
-            *unrest(rest, model),
-        ),
+        controllers=controllers_for(robot),
     )
 
 

@@ -10,21 +10,19 @@ import mujoco
 import numpy as np
 
 from poise.baselines.allowance import allows
-from poise.baselines.controller import CompiledController
 from poise.baselines.environments.hand_over import WholeStep, blend_torques
-from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import PoiseError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.servos import drive
-from poise.envs.compiled.calls import run
 from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import Realism, load_realism
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 
+from .outside import OutsideController
 from .readings import Readings
 from .sensed import SensedController
 
@@ -67,12 +65,11 @@ def load_standalone(
     body = robot if isinstance(robot, Robot) else load_robot(robot)
     agent = load_agent(name, body)
     if realism is not None:
-        check_usable(agent.name, agent.env)
         return SensedController(agent, load_realism(realism))
     return StandaloneController(agent)
 
 
-class StandaloneController:
+class StandaloneController(OutsideController):
     """Joint torques from readings of base and joints, the same bits as in an environment.
 
     Call `reset` once, and then `torques` every `period` seconds; hold what it returns meanwhile.
@@ -83,28 +80,16 @@ class StandaloneController:
 
     On the same readings, with `ground_wrench`, the torques are bit for bit those of `poise
     evaluate`; without it they are for as long as nothing but the ground pushes the robot.
-
-    Attributes:
-        name: of the controller, as it was loaded.
-        robot: that it is made for; `robot.torque_limit` (nu,) [N·m] has the motors' limits.
-        period: seconds between two calls of `torques`.
-        joint_names: (nj,) in the order of `Readings`.
-        motor_names: (nu,) in the order of the torques.
-        fingerprint: hash of the controller's configuration and the policy's weights.
     """
 
     def __init__(self, agent: Agent):
-        env = agent.env
-        check_usable(agent.name, env)
+        super().__init__(agent)
+        env = self._env
         env.state_source = StateSource(env.simulation)  # delays are now the robot's own
-        self._agent, self._env = agent, env
-        self.name, self.robot, self.fingerprint = agent.name, env.robot, agent.fingerprint
-        self.joint_names, self.motor_names = env.robot.joint_names, env.robot.motor_names
         self._servos = _servos(env)
-        steps = env.control_substeps if isinstance(env, ResidualBalanceEnv) else env.substeps
         #: calls of `torques` in a control tick: servos answer in every physics step
-        self._calls = steps if self._servos else 1
-        self.period: float = steps * env.arrays.timestep / self._calls
+        self._calls = self._substeps if self._servos else 1
+        self.period = self._substeps * env.arrays.timestep / self._calls
         self._call: int | None = None  # of the tick; None before a reset
 
     def reset(self, readings: Readings) -> None:
@@ -112,10 +97,7 @@ class StandaloneController:
 
         Raises ConfigError naming what is missing, or no number.
         """
-        start = {"qpos": readings.qpos(self.robot), "qvel": readings.qvel(self.robot)}
-        self._env.reset(options={"push": [], **start})
-        if self._agent.begin is not None:
-            self._agent.begin()
+        self._begin(readings)
         self._call = 0
 
     def torques(self, readings: Readings) -> np.ndarray:
@@ -129,7 +111,8 @@ class StandaloneController:
         views = self._env.simulation.views
         if self._call == 0:
             self._set_state(qpos, qvel, readings.wrench())
-            self._tick()
+            self._act()
+            self._env.tick()  # its torques are in `views.ctrl`
         views.qpos[:], views.qvel[:] = qpos, qvel  # the tick has led the model on
         if self._servos is not None:
             self._servos()
@@ -148,25 +131,6 @@ class StandaloneController:
         if wrench is not None:
             sim.data.qfrc_constraint[:6] = wrench
         update_state(sim.arrays, sim.views, sim.state_arrays)
-
-    def _tick(self) -> None:
-        """A control tick of the environment; its torques are in `views.ctrl`."""
-        env = self._env
-        if env.episode.ticks[0] == 0:  # a policy step begins
-            run(env.step_end().observe)
-            env.set_action(self._agent.act(env.episode.observation.astype(np.float32)))
-        env.tick()
-
-
-def check_usable(name: str, env: BalanceEnv) -> None:
-    """Raise ConfigError for a controller that is no use outside of a simulation."""
-    controller = env.controller if isinstance(env, ResidualBalanceEnv) else None
-    if isinstance(controller, CompiledController) and controller.outputs().soft_root:
-        raise ConfigError("has a soft root: it needs a force from nowhere, which no robot has",
-                          source=name, field="root")  # fmt: skip
-    if any(term.name == "push" for term in env.terms):
-        raise ConfigError("observes the push, which no sensor tells", source=name,
-                          field="observation")  # fmt: skip
 
 
 def _servos(env: BalanceEnv) -> Callable[[], object] | None:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled.calls import Program, run
 from poise.envs.physics.state import RobotState
@@ -19,6 +18,7 @@ from poise.envs.sensing.motors import DAMPING, STIFFNESS, TARGET, TORQUE
 from poise.envs.sensing.realism import PARTS, Realism
 from poise.training.benchmarking.trials.agents import Agent
 
+from .outside import OutsideController
 from .readings import Measurement, Readings
 
 
@@ -110,7 +110,7 @@ class MeasuredState(EstimatedState):
         run(self.believing)
 
 
-class SensedController:
+class SensedController(OutsideController):
     """What the motors are asked for, from measurements: the bits of the benchmark at that level.
 
     The estimator and the predictor are those of the benchmark. The level of realism says what is
@@ -120,18 +120,13 @@ class SensedController:
     Call `reset` once, and then `command` every `period` seconds with what was measured since.
 
     Attributes:
-        name: of the controller, as it was loaded.
-        robot: that it is made for.
-        period: seconds between two calls of `command`.
         sensor_period: seconds between two measurements.
         measurements: that `command` takes, `period` over `sensor_period`.
-        joint_names: (nj,) in the order of `Measurement`.
-        motor_names: (nu,) in the order of `MotorCommand`.
-        fingerprint: hash of the controller's configuration and the policy's weights.
     """
 
     def __init__(self, agent: Agent, level: Realism):
-        env = agent.env
+        super().__init__(agent)
+        env = self._env
         if level.ideal:
             raise ConfigError("is ideal: its state needs no estimate; leave realism out",
                               source=agent.name, field="realism", choices=PARTS)  # fmt: skip
@@ -139,14 +134,8 @@ class SensedController:
         assert isinstance(env.state_source, EstimatedState)  # the level is not ideal
         self._state = MeasuredState.instead_of(env.state_source)
         env.state_source = self._state
-        self._agent, self._env = agent, env
-        self.name, self.robot, self.fingerprint = agent.name, env.robot, agent.fingerprint
-        self.joint_names, self.motor_names = env.robot.joint_names, env.robot.motor_names
-        self.measurements = (
-            env.control_substeps if isinstance(env, ResidualBalanceEnv) else env.substeps
-        )
-        self.sensor_period = env.arrays.timestep
-        self.period: float = self.measurements * self.sensor_period
+        self.measurements, self.sensor_period = self._substeps, env.arrays.timestep
+        self.period = self.measurements * self.sensor_period
         self._running = False
 
     @property
@@ -169,10 +158,7 @@ class SensedController:
             raise ConfigError("must be at least one", source="reset", field="measured")
         for each in self._state.start:
             each.check(self.robot)
-        pose = {"qpos": start.qpos(self.robot), "qvel": start.qvel(self.robot)}
-        self._env.reset(options={"push": [], **pose})
-        if self._agent.begin is not None:
-            self._agent.begin()
+        self._begin(start)
         self._running, self._first = True, True
 
     def command(self, measured: Measurement | Sequence[Measurement] = ()) -> MotorCommand:
@@ -203,10 +189,8 @@ class SensedController:
 
     def _tick(self) -> MotorCommand:
         """A control tick of the environment; what it simulates besides is of no account."""
+        self._act()
         env, motors = self._env, self._state.motors
-        if env.episode.ticks[0] == 0:  # a policy step begins
-            run(env.step_end().observe)
-            env.set_action(self._agent.act(env.episode.observation.astype(np.float32)))
         believed, views = self._state.state_arrays, env.simulation.views
         views.qpos[:], views.qvel[:] = believed.qpos, believed.qvel
         env.tick()

@@ -1,20 +1,44 @@
-"""The terminal shows several training runs, while they run and at their end."""
+"""Several training runs: how far each is, and what the terminal shows of them."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 from rich.console import Console
 
 from poise.configs.errors import ConfigError
-from poise.training.learning.policy_files import LAST, STATE, find_checkpoint, read_state
+from poise.training.learning.config import TrainConfig
+from poise.training.learning.policy_files import last_state
 from poise.training.running.tables import text_table
 from poise.training.running.terminal import steps_bar
 
-from .records import SeedRun, SeedSummary, evaluations
+from .records import SeedEntry, SeedSummary, evaluations, start_and_best
 
 PERIOD = 1.0  # [s] between looks
+
+
+@dataclass(frozen=True)
+class SeedRun:
+    """The run of one seed: what a process is given to do."""
+
+    config: TrainConfig
+    folder: Path
+
+    def entry(self) -> SeedEntry:
+        """How far it is, for seeds.json; raises ConfigError where its state cannot be read."""
+        state = last_state(self.folder)
+        start, best = start_and_best(state["evaluations"])
+        return {
+            "seed": self.config.seed,
+            "folder": self.folder.name,
+            "timesteps": state["timesteps"],
+            "finished": state["timesteps"] >= self.config.steps,
+            "start": start,
+            "best": best,
+        }
 
 
 class SeedProgress:
@@ -52,17 +76,14 @@ class SeedProgress:
 
     def _show(self) -> None:
         for run, task in zip(self.runs, self._tasks, strict=True):
-            checkpoint = find_checkpoint(run.folder / LAST)
-            if checkpoint is None:
-                continue
             try:
-                state = read_state(checkpoint / STATE)
+                entry = run.entry()
             except ConfigError:  # just being replaced
                 continue
-            rates = [row["recovered"] for row in state.get("evaluations", [])]
-            text = f"held out, recovered {rates[0]:.1%}" if rates else ""
-            text += f", best {max(rates[1:]):.1%}" if rates[1:] else ""
-            steps = min(state["timesteps"], run.config.steps)
+            start, best = entry["start"], entry["best"]
+            text = f"held out, recovered {start['recovered']:.1%}" if start else ""
+            text += f", best {best['recovered']:.1%}" if best and best is not start else ""
+            steps = min(entry["timesteps"], run.config.steps)
             self._bar.update(task, completed=steps, rate=text)
 
 

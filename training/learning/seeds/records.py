@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
@@ -12,20 +11,10 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.reading import is_file, read_json
 from poise.training.running.provenance import Circumstances
 
-if TYPE_CHECKING:  # they load SciPy and environments
+if TYPE_CHECKING:  # it loads SciPy
     from poise.training.benchmarking.statistics.rates import SeedFigures
-    from poise.training.learning.config import TrainConfig
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
-
-
-@dataclass(frozen=True)
-class SeedRun:
-    """The run of one seed: what a process is given to do."""
-
-    config: TrainConfig
-    folder: Path
-    resume: bool
 
 
 class Evaluation(TypedDict):

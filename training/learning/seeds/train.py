@@ -5,7 +5,6 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -19,23 +18,15 @@ from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.rates import seed_figures
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.curriculum import curriculum_levels
-from poise.training.learning.policy_files import CONFIG, LAST, STATE, find_checkpoint, read_state
+from poise.training.learning.policy_files import CONFIG, LAST, find_checkpoint
 from poise.training.learning.train import check_folder, check_pushes, train
 from poise.training.running.executor import Executor, check_backend
-from poise.training.running.folder_lock import FolderLock
+from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.provenance import circumstances
 from poise.training.running.stopping import keeps
 
-from .progress import SeedProgress, print_seeds
-from .records import (
-    SEEDS,
-    SeedEntry,
-    SeedRun,
-    SeedSummary,
-    evaluations,
-    read_seeds,
-    start_and_best,
-)
+from .progress import SeedProgress, SeedRun, print_seeds
+from .records import SEEDS, SeedEntry, SeedSummary, evaluations, read_seeds
 
 
 @allows()
@@ -77,8 +68,11 @@ def train_seeds(
     if workers is not None and workers < 1:
         raise ConfigError(f"must be at least 1, not {workers}", field="workers")
     given, seeds = seeds, _all_seeds(seeds, out, resume)
-    runs = [_run(replace(config, seed=seed, threads=1), out / f"seed-{seed}") for seed in seeds]
-    missing = [run for run in runs if not _entry(run)["finished"]]
+    runs = [SeedRun(replace(config, seed=seed, threads=1), out / f"seed-{seed}") for seed in seeds]
+    for run in runs:
+        if find_checkpoint(run.folder / LAST) is not None:
+            check_folder(run.config, run.folder, resume=True)  # one of another configuration
+    missing = [run for run in runs if not run.entry()["finished"]]
     curriculum_levels(config)
     env = config.make_env()  # compiles all that the runs need, once
     check_pushes(config, env)
@@ -101,19 +95,19 @@ def _train(
     """Train what is missing; writes seeds.json at the start, and whole at the end."""
     seeds = [run.config.seed for run in runs]
     write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
-    write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
+    write_atomic(out / SEEDS, json.dumps({"runs": [run.entry() for run in runs]}, indent=1) + "\n")
     failed: list[str] = []
     with SeedProgress(runs, console), executor:
         for run, error in executor.each(train_run, missing):
-            if error is None and not _entry(run)["finished"]:
+            if error is None and not run.entry()["finished"]:
                 error = f"{run.folder} is not finished here: do all machines see it?"
             if error is None:
-                console.print(_line(_entry(run)), markup=False, highlight=False)
+                console.print(_line(run.entry()), markup=False, highlight=False)
             else:
                 failed.append(f"seed {run.config.seed}: {error}")
     if failed:
         raise PoiseError(f"{'; '.join(failed)}; what is finished is kept, and --resume goes on")
-    entries = [_entry(run) for run in runs]
+    entries = [run.entry() for run in runs]
     rates = [[evaluations(entry)[1]["recovered"]] for entry in entries]
     summary: SeedSummary = {
         "runs": entries,
@@ -152,37 +146,10 @@ def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
         raise ConfigError("holds the run of a single seed; choose another folder",
                           source=out, field="out")  # fmt: skip
     there = [int(entry["seed"]) for entry in read_seeds(out)] if (out / SEEDS).exists() else []
-    if there and not resume:
-        raise ConfigError("already holds training runs; go on with --resume or choose another "
-                          "folder", source=out, field="out")  # fmt: skip
-    if resume and not there:
-        raise ConfigError("holds no runs to resume", source=out, field="resume")
+    check_resume(out, resume, bool(there), "training runs", "runs")
     if not (there or seeds):
         raise ConfigError("give at least one", field="seeds")
     return there + [seed for seed in seeds if seed not in there]
-
-
-def _run(config: TrainConfig, folder: Path) -> SeedRun:
-    """Refuses a folder that holds a run of another configuration."""
-    resume = find_checkpoint(folder / LAST) is not None
-    if resume:
-        check_folder(config, folder, resume)
-    return SeedRun(config, folder, resume)
-
-
-def _entry(run: SeedRun) -> SeedEntry:
-    """The evaluations of a run at its start and at its best, for seeds.json."""
-    checkpoint = find_checkpoint(run.folder / LAST)
-    state: dict[str, Any] = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
-    start, best = start_and_best(state.get("evaluations", []))
-    return {
-        "seed": run.config.seed,
-        "folder": run.folder.name,
-        "timesteps": state["timesteps"],
-        "finished": state["timesteps"] >= run.config.steps,
-        "start": start,
-        "best": best,
-    }
 
 
 def _line(entry: SeedEntry) -> str:

@@ -12,12 +12,12 @@ from poise.baselines.registry import controller_config
 from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.sensing.realism import IDEAL, load_realism
+from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 
-from .tasks import TuningWalks
+from .tasks import TuneConfig, TuningWalks
 
 if TYPE_CHECKING:  # it loads torch
     from poise.training.learning.policy import Policy
@@ -31,28 +31,24 @@ class Candidate:
     """A controller, and the trials by which it is judged alone and under a policy."""
 
     number: int
-    robot: str
+    config: TuneConfig
     controller: Mapping[str, object]  # its configuration
-    seconds: float
-    in_place: bool
     alone: tuple[Trial, ...]
-    policy: str | None = None
     below: tuple[Trial, ...] = ()  # met by the policy on top of the controller
-    realism: str = IDEAL
-    chatter: float = 0.0  # the price of torques that jump, see `TuneConfig`
 
 
 def play(candidate: Candidate) -> tuple[list[float], list[float]]:
     """`worth` of each trial, alone and under the policy."""
-    robot = _robot(candidate.robot)
+    config = candidate.config
+    robot = _robot(config.robot)
     settings: dict[str, Any] = {
         "controller": controller_config(candidate.controller),
-        "duration": candidate.seconds, "pushes": None,
-        "realism": load_realism(candidate.realism),
+        "duration": config.tasks.seconds, "pushes": None,
+        "realism": load_realism(config.realism),
     }  # fmt: skip
 
     def worths(agent: Agent, trials: Iterable[Trial]) -> list[float]:
-        return [worth(agent, each, candidate.in_place, candidate.chatter) for each in trials]
+        return [worth(agent, each, config.in_place, config.chatter) for each in trials]
 
     alone, below = [], []
     if candidate.alone:
@@ -60,8 +56,8 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
         action = np.zeros(len(env.action_names))
         agent = Agent("alone", env, lambda observation: action, "")
         alone = worths(agent, candidate.alone)
-    if candidate.policy is not None and candidate.below:
-        policy = _policy(candidate.policy, candidate.robot)
+    if config.policy is not None and candidate.below:
+        policy = _policy(config.policy, config.robot)
         agent = Agent("policy", policy.make_env(robot=robot, **settings), policy.act, "")
         below = worths(agent, candidate.below)
     return alone, below

@@ -6,7 +6,6 @@ gains are not fitted to a few trials. Needs the `cma` package (`pip install -e '
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypedDict
 
@@ -21,64 +20,17 @@ from poise.configs.outputs import check_out_folder
 from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.robots.robot import load_robot
-from poise.envs.sensing.realism import IDEAL
 from poise.training.running.executor import Executor
-from poise.training.running.folder_lock import FolderLock
+from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.stopping import keeps
 
 from .candidates import Candidate, check_walks, follow, play
 from .gains import Gains
 from .pace import Pace
-from .tasks import TuningPushes, TuningWalks
+from .tasks import TuneConfig
 
 CONFIG, GAINS, HISTORY = "config.yaml", "gains.yaml", "history.jsonl"
 AVERAGED = 16  # generations whose better halves the result is the mean of
-
-
-@dataclass(frozen=True)
-class TuneConfig:
-    """Everything that decides a search; written beside its results.
-
-    Attributes:
-        controller: where the search starts: a packaged controller or a .yaml file.
-        gains: the range of each number that is searched, by its path in the controller's
-            configuration (``com.weight``); on a log scale if both ends are above 0.
-        pushes: what candidates meet, unless there are `walks`.
-        walks: what they are told instead, of a controller that walks.
-        policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
-        in_place: a foot that moves is no recovery.
-        realism: name or file of the level that trials are played at.
-        chatter: what a trial's worth loses for torques that change by their limit in every tick.
-        generations, population, spread: of CMA-ES; spread is the first standard deviation, as a
-            fraction of each range.
-    """
-
-    controller: str
-    gains: dict[str, tuple[float, float]]
-    robot: str = "humanoid"
-    pushes: TuningPushes = field(default_factory=TuningPushes)
-    walks: TuningWalks | None = field(default=None, metadata={"omit": "default"})
-    policy: str | None = None
-    policy_share: float = field(default=0.4, metadata={"min": 0.0, "max": 1.0})
-    in_place: bool = False
-    realism: str = field(default=IDEAL, metadata={"omit": "default"})
-    chatter: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
-    generations: int = field(default=60, metadata={"min": 1})
-    population: int = field(default=14, metadata={"min": 4})
-    spread: float = field(default=0.15, metadata={"above": 0.0, "max": 1.0})
-    seed: int = field(default=0, metadata={"min": 0})
-
-    def __post_init__(self) -> None:
-        if not self.gains:
-            raise ValueError("gains: must name one or more")
-        for path, (low, high) in self.gains.items():
-            if not low < high:
-                raise ValueError(f"gains.{path}: must be [low, high] with low < high")
-
-    @property
-    def tasks(self) -> TuningPushes | TuningWalks:
-        """What candidates meet."""
-        return self.walks or self.pushes
 
 
 class Generation(TypedDict):
@@ -161,15 +113,9 @@ def tune(
 
 def _known(config: TuneConfig, out: Path, resume: bool) -> list[Generation]:
     """The generations that an earlier call has tried."""
-    if not is_file(out / CONFIG):
-        if resume:
-            raise ConfigError("holds no search to resume", source=out, field="resume")
-        return []
+    check_resume(out, resume, is_file(out / CONFIG), "a search", "search")
     if not resume:
-        raise ConfigError(
-            "already holds a search; go on with --resume or choose another folder",
-            source=out, field="out",
-        )  # fmt: skip
+        return []
     before = to_dict(build(TuneConfig, read_yaml(out / CONFIG), out / CONFIG))
     for name, value in to_dict(config).items():
         if name != "generations" and before[name] != value:
@@ -207,50 +153,41 @@ class _Search:
 
     def step(self, executor: Executor) -> Generation:
         """A generation; returns its line of the history."""
-        config = self.config
+        config, limits = self.config, self.limits
         units = [np.asarray(u) for u in self.cma.ask()]
         seeds = [config.seed + 100_000 * (2 * self.generation + k + 1) for k in range(2)]
-        with_policy = config.policy is not None and config.policy_share > 0.0
-        alone, below = (
-            tuple(config.tasks.draw(seed, self.robot, limits))
-            for seed, limits in zip(seeds, self.limits, strict=True)
-        )
-        if with_policy and config.policy_share == 1.0:
+        alone, below = (tuple(config.tasks.draw(seeds[k], self.robot, limits[k])) for k in range(2))
+        if config.policy is None or config.policy_share == 0.0:
+            below = ()
+        elif config.policy_share == 1.0:
             alone = ()
-        jobs = [
-            Candidate(
-                number, config.robot, self.gains.at(u), config.tasks.seconds, config.in_place,
-                alone, config.policy if with_policy else None, below if with_policy else (),
-                config.realism, config.chatter,
-            )
-            for number, u in enumerate(units)
-        ]  # fmt: skip
+        jobs = [Candidate(number, config, self.gains.at(u), alone, below)
+                for number, u in enumerate(units)]  # fmt: skip
         found = {job.number: values for job, values in executor.each(play, jobs)}
-        values = [[found[k][agent] for k in range(len(units))] for agent in range(2)]
-        generation, tried = self.generation, [u.tolist() for u in units]
-        self._take(units, values)
-        return {
-            "generation": generation,
-            "units": tried,
-            "alone": values[0],
-            "below": values[1],
-            "limits": [limits.tolist() for limits in self.limits],
+        row: Generation = {
+            "generation": self.generation,
+            "units": [u.tolist() for u in units],
+            "alone": [found[k][0] for k in range(len(units))],
+            "below": [found[k][1] for k in range(len(units))],
+            "limits": [],
         }
+        self._take(units, row)
+        row["limits"] = [each.tolist() for each in self.limits]
+        return row
 
     def again(self, row: Generation, source: Path) -> None:
         """A generation that has been played before."""
         units = [np.asarray(u) for u in self.cma.ask()]
         try:
-            values = [row["alone"], row["below"]]
             same = np.allclose(units, row["units"], rtol=0.0, atol=1e-12)
-            same = same and all(self._are_worths(each) for each in values)
+            same = same and self._are_worths(row["alone"]) and self._are_worths(row["below"])
         except (KeyError, TypeError, ValueError, OverflowError):
             same = False
         if not same:
             raise ConfigError(
                 f"line {self.generation + 1} is not what this search tries there", source=source
             )
-        self._take(units, values)
+        self._take(units, row)
 
     def _are_worths(self, values: list[list[float]]) -> bool:
         """True if these are values of all candidates and tasks, or of no tasks."""
@@ -259,15 +196,17 @@ class _Search:
         sizes = [(self.config.population, count) for count in (0, trials)]
         return found.shape in sizes and bool(np.all((found >= 0.0) & (found <= 1.0)))
 
-    def _take(self, units: list[np.ndarray], values: list[list[list[float]]]) -> None:
-        fraction = self.config.policy_share if values[1][0] else 0.0
+    def _take(self, units: list[np.ndarray], row: Generation) -> None:
+        """Let the search learn from what a generation was worth."""
+        fraction = self.config.policy_share if row["below"][0] else 0.0
         scores = np.zeros(len(units))
         shape = (len(units), len(self.limits[0]), len(self.config.tasks.levels))
-        for agent, weight in enumerate((1.0 - fraction, fraction)):
-            if values[agent][0]:
-                found = np.reshape(values[agent], shape)
+        agents = (row["alone"], 1.0 - fraction), (row["below"], fraction)
+        for k, (worths, weight) in enumerate(agents):
+            if worths[0]:
+                found = np.reshape(worths, shape)
                 scores += weight * found.mean(axis=(1, 2))
-                self.limits[agent] = follow(self.limits[agent], found)
+                self.limits[k] = follow(self.limits[k], found)
         self.cma.tell(units, (-scores).tolist())
         better = np.argsort(-scores, kind="stable")[: (len(units) + 1) // 2]
         self.centres.append(np.mean([units[k] for k in better], axis=0))

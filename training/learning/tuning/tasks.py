@@ -1,4 +1,4 @@
-"""What the candidates of a generation meet: pushes around a limit, or walks around a speed.
+"""What a search is told, and what its candidates meet: pushes around a limit, or walks.
 
 All of a generation meet the same; every generation draws new ones. The limit of each direction, or
 the speed of each command, follows the candidates: it rises while they master more than half.
@@ -12,6 +12,7 @@ from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
+from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.trial import Trial
 
 START = 0.5  # [s] of a push
@@ -107,3 +108,49 @@ class TuningWalks:
 def _check_levels(levels: tuple[float, ...]) -> None:
     if not levels or min(levels) <= 0.0:
         raise ValueError("levels: must be one or more fractions above 0")
+
+
+@dataclass(frozen=True)
+class TuneConfig:
+    """Everything that decides a search; written beside its results.
+
+    Attributes:
+        controller: where the search starts: a packaged controller or a .yaml file.
+        gains: the range of each number that is searched, by its path in the controller's
+            configuration (``com.weight``); on a log scale if both ends are above 0.
+        pushes: what candidates meet, unless there are `walks`.
+        walks: what they are told instead, of a controller that walks.
+        policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
+        in_place: a foot that moves is no recovery.
+        realism: name or file of the level that trials are played at.
+        chatter: what a trial's worth loses for torques that change by their limit in every tick.
+        generations, population, spread: of CMA-ES; spread is the first standard deviation, as a
+            fraction of each range.
+    """
+
+    controller: str
+    gains: dict[str, tuple[float, float]]
+    robot: str = "humanoid"
+    pushes: TuningPushes = field(default_factory=TuningPushes)
+    walks: TuningWalks | None = field(default=None, metadata={"omit": "default"})
+    policy: str | None = None
+    policy_share: float = field(default=0.4, metadata={"min": 0.0, "max": 1.0})
+    in_place: bool = False
+    realism: str = field(default=IDEAL, metadata={"omit": "default"})
+    chatter: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
+    generations: int = field(default=60, metadata={"min": 1})
+    population: int = field(default=14, metadata={"min": 4})
+    spread: float = field(default=0.15, metadata={"above": 0.0, "max": 1.0})
+    seed: int = field(default=0, metadata={"min": 0})
+
+    def __post_init__(self) -> None:
+        if not self.gains:
+            raise ValueError("gains: must name one or more")
+        for path, (low, high) in self.gains.items():
+            if not low < high:
+                raise ValueError(f"gains.{path}: must be [low, high] with low < high")
+
+    @property
+    def tasks(self) -> TuningPushes | TuningWalks:
+        """What candidates meet."""
+        return self.walks or self.pushes

@@ -17,7 +17,8 @@ from poise.training.pictures.figures.rates import BINS, fall_probability, forest
 from poise.training.pictures.figures.series import SIDES, Series, series
 from poise.training.pictures.figures.style import INLINE, Inline, look, sample
 from poise.training.running.columns import J50_MEAN
-from poise.training.running.summary import Interval, both_ends
+from poise.training.running.summary import both_ends
+from poise.training.running.trial_figures import Interval
 
 from .cells import Download, csv_text, download
 from .tables import bound_of, per_direction

@@ -31,7 +31,8 @@ from poise.training.running.columns import (
     TRIED,
     Entry,
 )
-from poise.training.running.summary import Bound, Direction, Sector
+from poise.training.running.summary import Direction, Sector
+from poise.training.running.trial_figures import Bound
 
 from .cells import (
     Cell,

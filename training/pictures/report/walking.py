@@ -23,7 +23,8 @@ from poise.training.running.columns import (
     TRIED,
     Figure,
 )
-from poise.training.running.summary import PhaseJ50, both_ends
+from poise.training.running.summary import both_ends
+from poise.training.running.trial_figures import PhaseJ50
 
 from .cells import Cell, Column, Table, cell, figure_table
 from .plots import spans

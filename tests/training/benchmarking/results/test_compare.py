@@ -29,7 +29,8 @@ from poise.training.benchmarking.trials.trial import Trial, failed
 from poise.training.cli.entry import main
 from poise.training.running.files import csv_text
 from poise.training.running.provenance import Circumstances
-from poise.training.running.summary import Entry, Rate, Summary
+from poise.training.running.summary import Entry, Summary
+from poise.training.running.trial_figures import Rate
 from tests.support.shared import robot
 from tests.training.benchmarking.evaluation.test_folder import OUTCOME
 from tests.training.benchmarking.suites.test_factors import part, small, won_below

@@ -20,8 +20,8 @@ from poise.training.benchmarking.trials.agents import Agent
 from poise.training.benchmarking.trials.trial import Trial
 from poise.training.learning.tuning.candidates import Candidate, follow, play, worth
 from poise.training.learning.tuning.gains import Gains
-from poise.training.learning.tuning.search import GAINS, HISTORY, TuneConfig, tune, tune_config
-from poise.training.learning.tuning.tasks import TuningPushes, TuningWalks
+from poise.training.learning.tuning.search import GAINS, HISTORY, tune, tune_config
+from poise.training.learning.tuning.tasks import TuneConfig, TuningPushes, TuningWalks
 from tests.support.evaluations import InProcess
 from tests.support.rivals import KNOWN, allowed, network
 from tests.support.shared import robot
@@ -127,9 +127,11 @@ def test_what_is_searched_plays_at_every_level():
 def test_the_candidate_is_what_plays():
     """Another configuration, another outcome: without torque the same push is a fall."""
     data = to_dict(controller_config("momentum-qp"))
-    job = Candidate(0, "humanoid", data, 3.0, True, (trial(8.0),))
+    config = small(pushes=TuningPushes(seconds=3.0), in_place=True)
+    job = Candidate(0, config, data, (trial(8.0),))
     assert play(job) == ([1.0], [])
-    policy = replace(job, alone=(), policy="residual", below=(trial(8.0), trial(40.0)))
+    under = replace(config, policy="residual")
+    policy = replace(job, config=under, alone=(), below=(trial(8.0), trial(40.0)))
     alone, (won, lost) = play(policy)
     assert alone == [] and won == 1.0 and lost < 0.15
     data["torque"]["share"] = 0.05
@@ -260,7 +262,8 @@ def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
         walks = build(TuningWalks, {"commands": told, "levels": [1.0]}, "tests")
         changed = {**data, "gait": {**data["gait"], **gait}}
         trials = tuple(walks.draw(3, robot(), walks.first(robot())))
-        ((value,), below) = play(Candidate(0, "humanoid", changed, 9.0, False, trials))
+        config = small(walks=replace(walks, seconds=9.0))
+        ((value,), below) = play(Candidate(0, config, changed, trials))
         assert below == []
         return value
 

@@ -22,11 +22,15 @@ def one_leg_qpos(robot: Robot, stance: int) -> np.ndarray | None:
     """
     model, data = robot.model, mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
-    goal = _goal(robot, data, stance)
+    goal, _ = _tasks(robot, data, stance)
+    goal[3:6] = 0.0  # no turn
+    goal[7] = goal[1]  # the CoM beside the sole
+    goal[8] += SwingTask().clearance * robot.height_com
     scale = np.ones(model.nv)
     scale[:3] = robot.height_com
     for _ in range(ROUNDS):
-        residual, jacobian = _tasks(robot, data, stance, goal)
+        values, jacobian = _tasks(robot, data, stance)
+        residual = values - goal
         if np.abs(residual).max() < CLOSE:
             return data.qpos.copy()
         change = _change(robot, data, residual, jacobian * scale, scale)
@@ -36,39 +40,24 @@ def one_leg_qpos(robot: Robot, stance: int) -> np.ndarray | None:
     return None
 
 
-def _goal(robot: Robot, data: mujoco.MjData, stance: int) -> np.ndarray:
-    """(9,) what `_tasks` are to be: the sole's place, no turn, the CoM, the other sole's height."""
-    place = _values(robot, data, stance)
-    lift = SwingTask().clearance * robot.height_com
-    return np.array([*place[:6], place[6], place[1], place[8] + lift])
+def _tasks(robot: Robot, data: mujoco.MjData, stance: int) -> tuple[np.ndarray, np.ndarray]:
+    """(9,) the stance sole's place and turn, the CoM, the other's height; the (9, nv) Jacobian.
 
-
-def _values(robot: Robot, data: mujoco.MjData, stance: int) -> np.ndarray:
-    """(9,) the stance sole's place and three zeros for its turn, the CoM, the other's height."""
-    mujoco.mj_kinematics(robot.model, data)
-    mujoco.mj_comPos(robot.model, data)
-    place, other = _point(robot, data, stance), _point(robot, data, 1 - stance)
-    com = data.subtree_com[robot.root_body_id]
-    return np.array([*place, 0.0, 0.0, 0.0, com[0], com[1], other[2]])
-
-
-def _tasks(
-    robot: Robot, data: mujoco.MjData, stance: int, goal: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(9,) the tasks' distance from the goal, and its (9, nv) Jacobian."""
-    model, sole = robot.model, robot.soles[stance]
-    residual = _values(robot, data, stance) - goal
+    The turn is back to the world's axes, in which the sole stands: R = exp(r) ≈ 1 + [r]ₓ.
+    """
+    model, (sole, lifted) = robot.model, (robot.soles[stance], robot.soles[1 - stance])
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    point, other = _point(robot, data, stance), _point(robot, data, 1 - stance)
     axes = data.xmat[sole.body_id].reshape(3, 3) @ sole.rotation
-    # the turn back to the world's axes, in which the sole stands: R = exp(r) ≈ 1 + [r]ₓ
-    residual[3:6] = 0.5 * np.array(
-        [axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]]
-    )
-    place, turn, com, lift = (np.zeros((3, model.nv)) for _ in range(4))
-    mujoco.mj_jac(model, data, place, turn, _point(robot, data, stance), sole.body_id)
+    turn = [axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]]
+    centre = data.subtree_com[robot.root_body_id]
+    values = np.concatenate([point, 0.5 * np.array(turn), centre[:2], other[2:]])
+    at, turned, com, lift = (np.zeros((3, model.nv)) for _ in range(4))
+    mujoco.mj_jac(model, data, at, turned, point, sole.body_id)
     mujoco.mj_jacSubtreeCom(model, data, com, robot.root_body_id)
-    other = _point(robot, data, 1 - stance)
-    mujoco.mj_jac(model, data, lift, None, other, robot.soles[1 - stance].body_id)
-    return residual, np.vstack([place, turn, com[:2], lift[2]])
+    mujoco.mj_jac(model, data, lift, None, other, lifted.body_id)
+    return values, np.vstack([at, turned, com[:2], lift[2]])
 
 
 def _point(robot: Robot, data: mujoco.MjData, sole: int) -> np.ndarray:
