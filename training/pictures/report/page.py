@@ -36,7 +36,7 @@ from .worst_trials import (
 
 CROWD = 4  # of controllers; with more, bands and bars are shown for the one that is pointed at
 EMBEDDED = 600_000  # [bytes] trials.csv is embedded up to this size, beyond it packed
-PACKED = 2_500_000  # [bytes] up to this size
+PACKED = 2_500_000  # [bytes] up to this size; a longer one stays in the folder
 
 
 def write_report(
@@ -99,6 +99,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
     cases, notes = _cases(results, baseline, order, films, console)
     envelope, own_envelopes = plots.envelopes(results)
     falls, curves = plots.falls(results)
+    trials = _file(results, TRIALS, TABLE_BYTES)
     return render_page("report.html.j2",
         summary=results.summary,
         trial_count=len({record.trial for record in results.records}),
@@ -123,8 +124,8 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         signal_keys=signal_keys(),
         notes=notes,
         facts=_facts(results),
-        trials=_trials(results),
-        summary_file=_summary_file(results),
+        trials=trials if trials.size <= PACKED else None,
+        summary_file=_file(results, SUMMARY, JSON_BYTES),
         crowded=len(order) > CROWD,
     )  # fmt: skip
 
@@ -250,15 +251,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     return [(name, str(value)) for name, value in rows if value is not None]
 
 
-def _trials(results: Results) -> Download | None:
-    """trials.csv, packed where it is long; None where it is too long for a page."""
-    text = read_text(results.folder / TRIALS, TABLE_BYTES)
-    if len(text) <= EMBEDDED:
-        return download(TRIALS, text)
-    packed = download(TRIALS, text, pack=True)
-    return packed if packed.size <= PACKED else None
-
-
-def _summary_file(results: Results) -> Download:
-    text = read_text(results.folder / SUMMARY, JSON_BYTES)
-    return download(SUMMARY, text, pack=len(text) > EMBEDDED)
+def _file(results: Results, name: str, most: int) -> Download:
+    """A file of the folder, packed where it is long."""
+    text = read_text(results.folder / name, most)
+    return download(name, text, pack=len(text) > EMBEDDED)

@@ -16,11 +16,10 @@ from poise.training.pictures.figures.palette import GREY, INK
 from poise.training.pictures.figures.rates import BINS, fall_probability, forest
 from poise.training.pictures.figures.series import SIDES, Series, series
 from poise.training.pictures.figures.style import INLINE, Inline, look, sample
-from poise.training.running.columns import J50_MEAN
-from poise.training.running.summary import Interval, both_ends
+from poise.training.running.columns import J50_MEAN, Entry
+from poise.training.running.summary import both_ends
 
 from .cells import Download, csv_text, download
-from .tables import bound_of, per_direction
 
 SMALL = 2.2  # width of one controller's own picture [in]
 PARTS = {"envelope": "Standard pushes", "grid": "Grid of pushes", "random": "Random pushes",
@@ -165,21 +164,20 @@ def limit_fractions(results: Results, part: str) -> tuple[np.ndarray, str]:
 def _envelopes(
     results: Results,
 ) -> tuple[str, list[Series], tuple[Sequence[float], Sequence[float]] | None]:
-    """Unit, series, and the ankle limit where J50 was measured."""
-    rows: dict[tuple[str, int], list[tuple[float, ...]]] = {}
-    measured = False
-    for name, index, entry in per_direction(results):
-        measured = measured or "j50" in entry
-        key = "j50" if measured else "fraction50"
-        value, around = cast(float, entry.get(key)), cast(Interval, entry.get(f"{key}_ci95"))
-        side = SIDES[bound_of(entry)]
-        row = (entry["direction"], value, *(both_ends(around) or NONE), side)
-        rows.setdefault((name, index), []).append(row)
-    order = results.summary["ranking"]
+    """Unit, series, and the ankle limit where J50 was measured; else they are of sectors."""
+    entries, order = results.summary["controllers"], results.summary["ranking"]
+    aims = {name: entries[name].get("directions") or entries[name].get("sectors") for name in order}
+    own = {name: cast(Sequence[Entry], found) for name, found in aims.items() if found}
+    measured = any("j50" in each for found in own.values() for each in found)
+    key = "j50" if measured else "fraction50"
     found = [
-        series(name, index, sorted(points))
-        for (name, index), points in sorted(rows.items(), key=lambda item: order.index(item[0][0]))
-    ]
+        series(name, results.controllers.index(name), sorted(
+            (each["direction"], each.get(key), *(both_ends(each.get(f"{key}_ci95")) or NONE),
+             SIDES[each.get(f"{key}_bound")])
+            for each in found
+        ))
+        for name, found in own.items()
+    ]  # fmt: skip
     if not measured:
         return f"of the {results.summary['scale']}", found, None
     angles, limit = zip(*results.summary["robot"]["ankle_limit"], strict=True)

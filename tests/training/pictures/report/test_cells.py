@@ -13,7 +13,6 @@ from poise.training.pictures.report.cells import (
     Table,
     cell,
     download,
-    name_cell,
     number_text,
     p_cell,
 )
@@ -24,8 +23,8 @@ TABLE = Table(
     "A caption.",
     COLUMNS,
     [
-        [name_cell("a, b", 0), cell(1 / 3, ".1f", (-0.25, 0.5)), cell(None)],
-        [name_cell("ü", 1), cell(None), cell(None)],
+        [Cell("a, b", "a, b", head=True), cell(1 / 3, ".1f", (-0.25, 0.5)), cell(None)],
+        [Cell("ü", "ü", head=True), cell(None), cell(None)],
     ],
 )
 
