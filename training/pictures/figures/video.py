@@ -14,7 +14,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.renderer import SceneRenderer
 
-from .encoder import Encoder, check_video
+from .encoder import check_video, encoded
 from .style import saved_figure
 
 INK = (20, 20, 20)  # of names over pictures
@@ -182,10 +182,10 @@ def _film(
 ) -> int:
     """Play all to their ends at the same time and write what `frame` gives; how many frames."""
     frames, step = 1, 0
-    with Encoder(path, size, rate) as video:
+    with encoded(path, size, rate) as send:
         for each in episodes:
             each.start()
-        video.send(frame())
+        send(frame())
         while not all(each.done for each in episodes):
             playing = [each for each in episodes if not each.done]
             for each in playing:
@@ -195,7 +195,7 @@ def _film(
             if step % every == 0 or ended:
                 for each in playing:
                     each.draw()
-                video.send(frame())
+                send(frame())
                 frames += 1
     return frames
 

@@ -24,7 +24,6 @@ class Trace:
         bodies, com: (n,) mean distance of the bodies, and that of the CoM, from the motion [m].
         cop: (n, 2) the measured centre of pressure, in the heading frame of the soles from their
             middle [m]; of a motion with steps from where that is at its begin.
-        contacts: (n, nc) whether each sole bears load.
         pushes: (start, duration) of each push [s].
         fallen: whether the robot fell.
     """
@@ -37,7 +36,6 @@ class Trace:
     bodies: np.ndarray
     com: np.ndarray
     cop: np.ndarray
-    contacts: np.ndarray
     pushes: tuple[tuple[float, float], ...]
     fallen: bool
 
@@ -71,7 +69,7 @@ class Tracer:
         if steps is not None:
             point = point - steps.sample(0.0).places[:, 0, :2].mean(axis=0)
         now = [env.simulation.time, env.motion_time, beta, np.sqrt(joints), bodies, com, *point]
-        self._rows.append(np.concatenate([now, state.contacts > 0.5]))
+        self._rows.append(np.array(now))
 
     def trace(self) -> Trace:
         """What has been seen."""
@@ -82,4 +80,4 @@ class Tracer:
         tempo[0] = tempo[1] if len(tempo) > 1 else 1.0
         beta, joints, bodies, com = rows[:, 2:6].T
         return Trace(time, motion_time, tempo, beta, joints, bodies, com, rows[:, 6:8],
-                     rows[:, 8:], self._pushes, self._fallen)  # fmt: skip
+                     self._pushes, self._fallen)  # fmt: skip

@@ -9,12 +9,11 @@ import viser
 
 from poise.configs.errors import PoiseError
 from poise.envs.viewing.quantities import Quantity
-from poise.training.pictures.sessions.choices import choices
 from poise.training.pictures.sessions.frames import between
 from poise.training.pictures.sessions.live import Frames, Play
 from poise.training.pictures.sessions.mouse import Pull
 from poise.training.pictures.sessions.pace import Pace
-from poise.training.pictures.sessions.spec import SessionSpec, Spec, TrialSpec, read_link
+from poise.training.pictures.sessions.spec import SessionSpec, Spec, TrialSpec, choices, read_link
 
 from .pages import Pages, send_films, send_picture
 from .panel import OPACITY, Panel, Wishes, status

@@ -12,11 +12,10 @@ from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.texts import code, plain
 from poise.envs.physics.pushes.options import body_names
 from poise.envs.viewing.quantities import Quantity
-from poise.training.pictures.sessions.choices import NOBODY, Choices
 from poise.training.pictures.sessions.live import Play
 from poise.training.pictures.sessions.mouse import DURATION, WEIGHT
 from poise.training.pictures.sessions.pace import Pace
-from poise.training.pictures.sessions.spec import MOST, Spec, TrialSpec
+from poise.training.pictures.sessions.spec import MOST, NOBODY, Choices, Spec, TrialSpec
 
 from .marks import SHOWN
 from .walking import WalkSliders
@@ -138,7 +137,7 @@ class Panel:
         buttons = gui.add_button_group("Time", ("Step", "Reset"))
         buttons.on_click(self._asked(self._step_or_reset))
         speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
-        speed.on_update(self._asked(lambda e: self.wishes.speed(SPEEDS[_of(e, SPEEDS)])))
+        speed.on_update(self._asked(lambda e: self.wishes.speed(SPEEDS.get(e.target.value, 1.0))))
         self.timeline: Any = gui.add_slider("Time [s]", 0.0, 0.02, 0.02, 0.0)
         self.timeline.on_update(self._asked(self._seek, users=True))
 
@@ -248,8 +247,3 @@ def status(play: Play, paused: bool, pace: Pace, pulled: Mapping[str, object] | 
     if pulled is not None:
         lines.append(f"**{pulled['impulse']} N·s** towards {pulled['direction']}°")
     return "  \n".join(lines)
-
-
-def _of(event: Any, options: dict[str, float]) -> str:
-    """The chosen option; the first one for what no page of ours sends."""
-    return event.target.value if event.target.value in options else next(iter(options))
