@@ -16,9 +16,9 @@ INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 
 CARDS = {"light": "#ffffff", "dark": "#1a1e22"}  # scheme → what is drawn on, as in report.css
 CONTRAST = 3.0  # to the card: WCAG's least for graphics
-QUANTITIES = {"com": COM, "cop": COP, "capture": CAPTURE_POINT}
+VARIABLES = {"com": COM, "cop": COP, "capture": CAPTURE_POINT}
 DRAWN = {f"s{k}": to_rgb(colour) for k, colour in enumerate(SERIES)} | {
-    name: quantity.colour for name, quantity in QUANTITIES.items()
+    name: quantity.colour for name, quantity in VARIABLES.items()
 }  # variable → colour of a series or a quantity
 ROLES = {"card": "white", "ink": INK, "muted": GREY, "rule": PALE}  # report.css gives both schemes
 NAMES = {to_hex(colour): name for name, colour in reversed(DRAWN.items())} | {

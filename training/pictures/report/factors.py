@@ -105,8 +105,8 @@ def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
             row[factor] = cell(None) if worst is None else _change(worst, base[0])
         rows.append(row)
     caption = "Change of the recovery rate at the worst level of each factor, in percent points."
-    columns = (CONTROLLER, Figure("standard", "standard case", ".0%"), *texts)
-    return entry_table("sensitivity", caption, columns, rows)
+    standard = Figure("standard", "standard case", ".0%")
+    return entry_table("sensitivity", caption, [CONTROLLER, standard, *texts], rows)
 
 
 def _change(level: Level, standard: float) -> Cell:

@@ -135,7 +135,7 @@ def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]
     told = "; ".join(f"{name} {'half at' if fit.bound is None else 'only a bound,'} {fit.j50:.2f}"
                      for name, fit in fits.items())  # fmt: skip
     out = Inline(f"Fraction of trials not recovered, over the {title}: {told}.")
-    fall_probability(out, trials, fits, unit="fraction", xlabel=title)
+    fall_probability(out, trials, fits, xlabel=title)
     return out.svg, lines
 
 
@@ -172,7 +172,7 @@ def _envelopes(
     key = "j50" if measured else "fraction50"
     found = [
         series(name, results.controllers.index(name), sorted(
-            (each["direction"], each.get(key), *(both_ends(each.get(f"{key}_ci95")) or NONE),
+            (each["direction"], each.get(key, np.nan), *(both_ends(each.get(f"{key}_ci95")) or NONE),
              SIDES[each.get(f"{key}_bound")])
             for each in found
         ))

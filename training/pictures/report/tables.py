@@ -85,7 +85,7 @@ def directions(results: Results) -> Table | None:
     """J50 or the fraction of the limit in every direction; None where no suite measured it."""
     entries = results.summary["controllers"].values()
     key = "directions" if any(entry.get("directions") for entry in entries) else "sectors"
-    columns = (CONTROLLER, DIRECTION, *TRIED, *AIMED)
+    columns: list[Figure | Text] = [CONTROLLER, DIRECTION, *TRIED, *AIMED]
     found = entries_of(results, results.controllers, key)
     return entry_table("directions", "Every direction.", columns, found)
 

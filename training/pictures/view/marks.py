@@ -9,30 +9,9 @@ import trimesh
 import viser
 
 from poise.envs.viewing.overlays import ARROW, SPHERE, Mark
-from poise.envs.viewing.quantities import (
-    CAPTURE_POINT,
-    COM,
-    CONTACT_FORCE,
-    COP,
-    FOOTHOLD,
-    PUSH,
-    REFERENCE,
-    SUPPORT,
-    Quantity,
-)
+from poise.envs.viewing.quantities import Quantity
 from poise.training.pictures.figures.palette import linear_rgb
 
-#: quantity → names of its marks
-SHOWN: dict[Quantity, tuple[str, ...]] = {
-    PUSH: ("push",),
-    COM: ("com", "com on ground"),
-    COP: ("cop",),
-    CAPTURE_POINT: ("capture point",),
-    SUPPORT: ("support",),
-    CONTACT_FORCE: ("contact force",),
-    FOOTHOLD: ("foothold",),
-    REFERENCE: (),  # a robot, not a mark
-}
 ROOM = {"spheres": 2, "cylinders": 32, "heads": 10}  # mesh → instances for each robot
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0], np.float32)
 HEAD = 0.3  # of an arrow's length, at most
@@ -89,10 +68,10 @@ class Marks:
 
     def show(self, found: Iterable[tuple[Mark, np.ndarray]]) -> None:
         """Show marks, each moved by an offset (3,) [m]."""
-        left_out = {name for quantity in self.hidden for name in SHOWN[quantity]}
+        left_out = {quantity.colour for quantity in self.hidden}
         placed: dict[str, list[Placed]] = {name: [] for name in self.sets}
         for mark, offset in found:
-            if mark.name not in left_out:
+            if mark.colour not in left_out:
                 for name, start, end, scale in _parts(mark):
                     placed[name].append((start + offset, end + offset, scale, mark))
         for name, each in self.sets.items():

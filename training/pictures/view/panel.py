@@ -11,13 +11,12 @@ import viser
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.texts import code, plain
 from poise.envs.physics.pushes.options import body_names
-from poise.envs.viewing.quantities import Quantity
+from poise.envs.viewing.quantities import QUANTITIES, Quantity
 from poise.training.pictures.sessions.live import Play
 from poise.training.pictures.sessions.mouse import DURATION, WEIGHT
 from poise.training.pictures.sessions.pace import Pace
 from poise.training.pictures.sessions.spec import MOST, NOBODY, Choices, Spec, TrialSpec
 
-from .marks import SHOWN
 from .walking import WalkSliders
 
 SPEEDS = {"1×": 1.0, "1/2×": 0.5, "1/4×": 0.25, "1/10×": 0.1}  # label → simulated over real time
@@ -194,7 +193,7 @@ class Panel:
 
     def _showing(self, dark: bool) -> None:
         gui, wishes = self._gui, self.wishes
-        for quantity in SHOWN:
+        for quantity in QUANTITIES:
             box = gui.add_checkbox(quantity.label, True)
             box.on_update(self._asked(partial(self._show, quantity)))
         opacity = gui.add_slider("Robot's opacity", 0.1, 1.0, 0.05, OPACITY)
