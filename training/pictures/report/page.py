@@ -96,7 +96,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "smallest": report_tables.smallest(results, order),
         "losses": report_tables.losses(results, order),
     }
-    cases, notes = _cases(results, baseline, order, films, console)
+    cases, notes = _cases(results, films, console)
     envelope, own_envelopes = plots.envelopes(results)
     falls, curves = plots.falls(results)
     trials = _file(results, TRIALS, TABLE_BYTES)
@@ -131,10 +131,10 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
 
 
 def _cases(
-    results: Results, baseline: str, order: Sequence[str], films: bool, console: Console
+    results: Results, films: bool, console: Console
 ) -> tuple[list[dict[str, object]], list[str]]:
     """The trials shown, and what to say of those that are not."""
-    cases = choose_exhibits(results, baseline, order)
+    cases = choose_exhibits(results, results.reference, results.summary["ranking"])
     notes: list[str] = []
     if not films:
         notes.append("The trials were not played again: the report was asked to go without.")
@@ -145,7 +145,7 @@ def _cases(
     shown = []
     for k, case in enumerate(cases, 1):
         played = []
-        for record in [case.record, *([case.baseline] if case.baseline else [])]:
+        for record in filter(None, (case.record, case.baseline)):
             key = (record.trial, record.controller)
             if films and key not in done:
                 console.print(f"playing trial {k} of {len(cases)} again: {record.controller}",

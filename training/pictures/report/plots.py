@@ -7,7 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from poise.training.benchmarking.metrics.played import DIRECTIONAL
-from poise.training.benchmarking.results.read import Record, Results
+from poise.training.benchmarking.results.read import Results
 from poise.training.benchmarking.statistics.fits import fit_logistic, trial_bins
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.trials.step_limits import DRAWN, line_name
@@ -119,14 +119,25 @@ def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
 
 
 def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]]]:
-    fraction, title = limit_fractions(results, part)
+    """The picture of a part, and the bins of each controller.
+
+    Pushes by direction are measured by the ankle limit, as the summary has it.
+    """
+    limits = {
+        direction["direction"]: direction["ankle_limit"]
+        for entry in results.summary["controllers"].values()
+        for direction in (entry.get("directions", ()) if part in DIRECTIONAL else ())
+    }
+    title = f"push, in fractions of the {'ankle limit' if limits else results.summary['scale']}"
     trials, fits = {}, {}
     lines: list[tuple[object, ...]] = []
     for name in results.controllers:
-        mine = [k for k, record in enumerate(results.records)
-                if record.controller == name and np.isfinite(fraction[k])]  # fmt: skip
-        recovered = np.array([results.records[k].recovered for k in mine])
-        trials[name] = fraction[mine], recovered
+        own = [record for record in results.of(name) if record.part == part]
+        shares = np.array([record.impulse / limits[record.direction]
+                           if record.direction in limits else record.fraction for record in own],
+                          dtype=float)  # fmt: skip
+        known = np.isfinite(shares)
+        trials[name] = shares[known], np.array([record.recovered for record in own])[known]
         fits[name] = fit = fit_logistic(*trials[name])
         lines += [
             (part, name, *found, *wilson_interval(*found[1:]), fit.j50, fit.bound, fit.scale)
@@ -139,45 +150,26 @@ def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]
     return out.svg, lines
 
 
-def limit_fractions(results: Results, part: str) -> tuple[np.ndarray, str]:
-    """Every record's push over the limit, NaN for those of other parts, and what of.
-
-    Pushes by direction are measured by the ankle limit, as the summary has it.
-    """
-    limits = {
-        direction["direction"]: direction["ankle_limit"]
-        for entry in results.summary["controllers"].values()
-        for direction in (entry.get("directions", ()) if part in DIRECTIONAL else ())
-    }
-
-    def fraction(record: Record) -> float:
-        if record.part != part:
-            return np.nan
-        limit = limits.get(record.direction)
-        return record.impulse / limit if limit else record.fraction
-
-    what = "ankle limit" if limits else results.summary["scale"]
-    found = np.array([fraction(record) for record in results.records])
-    return found, f"push, in fractions of the {what}"
-
-
 def _envelopes(
     results: Results,
 ) -> tuple[str, list[Series], tuple[Sequence[float], Sequence[float]] | None]:
     """Unit, series, and the ankle limit where J50 was measured; else they are of sectors."""
-    entries, order = results.summary["controllers"], results.summary["ranking"]
-    aims = {name: entries[name].get("directions") or entries[name].get("sectors") for name in order}
-    own = {name: cast(Sequence[Entry], found) for name, found in aims.items() if found}
-    measured = any("j50" in each for found in own.values() for each in found)
+    own: dict[str, Sequence[Entry]] = {}
+    for name in results.summary["ranking"]:
+        entry = results.summary["controllers"][name]
+        if aims := entry.get("directions") or entry.get("sectors"):
+            own[name] = cast(Sequence[Entry], aims)
+    measured = any("j50" in each for entries in own.values() for each in entries)
     key = "j50" if measured else "fraction50"
+
+    def point(entry: Entry) -> tuple[float, ...]:
+        ends, side = both_ends(entry.get(f"{key}_ci95")) or NONE, SIDES[entry.get(f"{key}_bound")]
+        return entry["direction"], entry.get(key, np.nan), *ends, side
+
     found = [
-        series(name, results.controllers.index(name), sorted(
-            (each["direction"], each.get(key, np.nan), *(both_ends(each.get(f"{key}_ci95")) or NONE),
-             SIDES[each.get(f"{key}_bound")])
-            for each in found
-        ))
-        for name, found in own.items()
-    ]  # fmt: skip
+        series(name, results.controllers.index(name), sorted(map(point, entries)))
+        for name, entries in own.items()
+    ]
     if not measured:
         return f"of the {results.summary['scale']}", found, None
     angles, limit = zip(*results.summary["robot"]["ankle_limit"], strict=True)
