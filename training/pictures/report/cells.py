@@ -8,8 +8,8 @@ import gzip
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple, cast
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, cast
 
 from markupsafe import Markup
 
@@ -18,20 +18,26 @@ from poise.training.running.columns import NONE, P_VALUE, Entry, Figure
 from poise.training.running.summary import both_ends
 
 
-class Column(NamedTuple):
-    """A column.
+@dataclass(frozen=True)
+class Text:
+    """A column of texts; one of numbers is a `Figure`.
 
     Attributes:
-        key: its name in the CSV.
-        title: its heading.
-        note: what it means, in a few words; shown when it is pointed at.
-        interval: whether its cells have one; the CSV then has key_low and key_high too.
+        key: in an entry, whose value is a text or a `Cell`; and its name in the CSV.
+        heading, words: as of a figure.
+        head: whether it says what the row is of.
     """
 
     key: str
-    title: str
-    note: str = ""
-    interval: bool = False
+    heading: str
+    words: str = ""
+    head: bool = False
+    csv: ClassVar[str] = ""
+    ends: ClassVar[str] = ""
+
+
+Column = Figure | Text
+CONTROLLER = Text("controller", "controller", head=True)
 
 
 class Cell(NamedTuple):
@@ -65,21 +71,19 @@ class Table:
     caption: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]
-    notes: Sequence[str] = field(default_factory=tuple)
 
     def csv(self) -> str:
         """The numbers as they are, not as they are shown."""
         header = []
         for column in self.columns:
-            header.append(column.key)
-            if column.interval:
-                header += [f"{column.key}_low", f"{column.key}_high"]
+            name = column.csv or column.key
+            header += [name, f"{name}_low", f"{name}_high"] if column.ends else [name]
         lines = []
         for row in self.rows:
             line: list[float | str | None] = []
             for column, cell in zip(self.columns, row, strict=True):
                 line.append(cell.value)
-                if column.interval:
+                if column.ends:
                     line += cell.ends or (None, None)
             lines.append(line)
         return csv_text(header, lines)
@@ -94,7 +98,7 @@ class Table:
         count = len(self.columns)
         kept = [k for k in range(count) if any(row[k].value is not None for row in self.rows)]
         rows = [[row[k] for k in kept] for row in self.rows]
-        return Table(self.name, self.caption, [self.columns[k] for k in kept], rows, self.notes)
+        return Table(self.name, self.caption, [self.columns[k] for k in kept], rows)
 
 
 class Download(NamedTuple):
@@ -146,38 +150,15 @@ def p_cell(value: float | None) -> Cell:
     return Cell(value, text)
 
 
-class Text(NamedTuple):
-    """A column of texts.
-
-    Attributes:
-        key: in an entry, whose value is a text or a `Cell`; and its name in the CSV.
-        title, note: as of `Column`.
-        head: whether it says what the row is of.
-    """
-
-    key: str
-    title: str
-    note: str = ""
-    head: bool = False
-
-
-CONTROLLER = Text("controller", "controller", head=True)
-
-
 def entry_table(
-    name: str, caption: str, columns: Sequence[Figure | Text], entries: Sequence[Entry]
+    name: str, caption: str, columns: Sequence[Column], entries: Sequence[Entry]
 ) -> Table | None:
     """A row for each entry, without columns in which none has a value; None without any figure."""
     rows = [[_cell_of(each, entry) for each in columns] for entry in entries]
     figures = [k for k, each in enumerate(columns) if isinstance(each, Figure)]
     if all(row[k].value is None for row in rows for k in figures):
         return None
-    heads = [
-        Column(each.key, each.title, each.note) if isinstance(each, Text)
-        else Column(each.csv or each.key, each.heading, each.words, bool(each.ends))
-        for each in columns
-    ]  # fmt: skip
-    return Table(name, caption, heads, rows).without_empty()
+    return Table(name, caption, columns, rows).without_empty()
 
 
 def entries_of(results: Results, order: Sequence[str], key: str) -> list[Entry]:
@@ -189,7 +170,7 @@ def entries_of(results: Results, order: Sequence[str], key: str) -> list[Entry]:
     ]
 
 
-def _cell_of(column: Figure | Text, entry: Entry) -> Cell:
+def _cell_of(column: Column, entry: Entry) -> Cell:
     """What an entry has of a column: a figure in full, and as it is shown."""
     if isinstance(column, Text):
         text = entry[column.key]

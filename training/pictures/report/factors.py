@@ -22,7 +22,7 @@ from poise.training.running.columns import (
 )
 from poise.training.running.summary import Level
 
-from .cells import CONTROLLER, Cell, Table, Text, cell, entry_table
+from .cells import CONTROLLER, Cell, Column, Table, Text, cell, entry_table
 from .tables import TRIAL
 
 TITLES = {
@@ -138,7 +138,7 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
 
 def seed_table(results: Results) -> Table | None:
     """Interquartile means over training seeds and the worst seed; None without groups of seeds."""
-    columns: list[Figure | Text] = [Text("name", "runs"), Figure("seeds", "seeds", ".0f")]
+    columns: list[Column] = [Text("name", "runs"), Figure("seeds", "seeds", ".0f")]
     for each in OVER_SEEDS:
         mean, worst = f"{each.key}_iqm", f"{each.key}_worst"
         columns += [

@@ -31,7 +31,7 @@ from poise.training.running.columns import (
     Figure,
 )
 
-from .cells import CONTROLLER, Table, Text, entries_of, entry_table
+from .cells import CONTROLLER, Column, Table, Text, entries_of, entry_table
 from .worst_trials import smallest_lost
 
 SMALLEST = 3  # pushes listed for each controller
@@ -85,7 +85,7 @@ def directions(results: Results) -> Table | None:
     """J50 or the fraction of the limit in every direction; None where no suite measured it."""
     entries = results.summary["controllers"].values()
     key = "directions" if any(entry.get("directions") for entry in entries) else "sectors"
-    columns: list[Figure | Text] = [CONTROLLER, DIRECTION, *TRIED, *AIMED]
+    columns: list[Column] = [CONTROLLER, DIRECTION, *TRIED, *AIMED]
     found = entries_of(results, results.controllers, key)
     return entry_table("directions", "Every direction.", columns, found)
 

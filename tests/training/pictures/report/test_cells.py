@@ -9,15 +9,16 @@ import io
 
 from poise.training.pictures.report.cells import (
     Cell,
-    Column,
     Table,
+    Text,
     cell,
     download,
     number_text,
     p_cell,
 )
+from poise.training.running.columns import Figure
 
-COLUMNS = [Column("name", "Name"), Column("x", "X [m]", interval=True), Column("none", "None")]
+COLUMNS = [Text("name", "Name"), Figure("x", "X", ".1f", "m", ends="x_ci95"), Text("none", "None")]
 TABLE = Table(
     "some",
     "A caption.",
