@@ -61,9 +61,8 @@ class Tracer:
         stance = self._footing.stance if steps is None else Stance.of(state)
         joints, bodies, _, com = tracking_errors(env, self._reference, stance)
         away = state.com - self._reference.com
-        scale = Tempo().distance * env.robot.height_com
-        if env.tempo.waits:
-            scale = env.tempo.distance * env.robot.height_com
+        tempo = env.tempo if env.tempo.waits else Tempo()
+        scale = tempo.distance * env.robot.height_com
         beta = np.exp(-float(away[:2] @ away[:2]) / scale**2)
         point = (state.cop - self._reference.origin[:2]) @ self._reference.turn[:2, :2]
         if steps is not None:

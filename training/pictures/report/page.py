@@ -184,10 +184,9 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
     """A case for the template."""
     record = case.record
     trial = results.trial(record)
-    start = record.start
-    pushes = words.push_times(trial)
+    pushes = [(push.start, push.duration) for push in trial.pushes]
     # the last time worth showing
-    end = (record.fall_time if record.fallen else (start or 0.0) + 3.0) + AFTER
+    end = (record.fall_time if record.fallen else (record.start or 0.0) + 3.0) + AFTER
     parts = []
     for played in films:
         who, t = played.record, played.signals.t
