@@ -164,7 +164,7 @@ def entry_table(
 def entries_of(results: Results, order: Sequence[str], key: str) -> list[Entry]:
     """The entries that the controllers have under a key such as "walks", with their names."""
     return [
-        {"controller": name, **entry}
+        {**entry, "controller": name}
         for name in order
         for entry in cast(Sequence[Entry], results.summary["controllers"][name].get(key, ()))
     ]

@@ -39,6 +39,7 @@ RANK = Figure("rank", "#", ".0f",
               words="by mean J50, else by the fraction of the limit, else by rate")  # fmt: skip
 DIRECTION = Figure("direction", "direction", "g", "°", "counter-clockwise from forward")
 TRIAL = Figure("trial", "trial", ".0f", words="its number in trials.csv")
+APART = {"lost": None, "won": None, "p_mcnemar": None}  # of one that nothing is compared with
 PAIR = (Text("b", "b", head=True), Text("a", "against a", head=True))
 #: of a record
 LOST = (
@@ -66,7 +67,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
     )  # fmt: skip
     rank, against = places(entries), _against(results, baseline)
     rows = [
-        {"controller": name, "rank": rank[name], **entries[name], **against.get(name, {})}
+        {**entries[name], **against.get(name, APART), "controller": name, "rank": rank[name]}
         for name in results.summary["ranking"]
     ]
     caption = f"Controllers, the best first. Lost and won are counted against {baseline}."
