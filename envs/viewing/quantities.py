@@ -28,4 +28,7 @@ CAPTURE_POINT = Quantity("capture point", (0.0, 0.447, 0.698))  # blue
 SUPPORT = Quantity("support polygon", (0.0, 0.62, 0.451))  # bluish green
 CONTACT_FORCE = Quantity("contact forces", (0.8, 0.475, 0.655))  # reddish purple
 FOOTHOLD = Quantity("planned foothold", (0.337, 0.706, 0.914))  # sky blue
-REFERENCE = Quantity("reference motion", (0.941, 0.894, 0.259))  # yellow
+REFERENCE = Quantity("reference motion", (0.941, 0.894, 0.259))  # yellow, a robot
+
+#: in the order in which people choose among them
+QUANTITIES = (PUSH, COM, COP, CAPTURE_POINT, SUPPORT, CONTACT_FORCE, FOOTHOLD, REFERENCE)

@@ -1,7 +1,6 @@
 """Environments that can be drawn: what Gymnasium asks of one."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import gymnasium
 import mujoco
@@ -13,9 +12,7 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.simulation import Simulation
 
 from .camera import Camera, find_camera
-
-if TYPE_CHECKING:
-    from .renderer import SceneRenderer
+from .renderer import SceneRenderer
 
 
 class RenderedEnv(Copyable, gymnasium.Env):
@@ -62,8 +59,6 @@ class RenderedEnv(Copyable, gymnasium.Env):
         if self.render_mode is None:
             return None
         if self._renderer is None:
-            from .renderer import SceneRenderer
-
             self._renderer = SceneRenderer(
                 self.simulation, self.render_mode == "human", self.width, self.height, self.camera
             )

@@ -60,7 +60,7 @@ def draw_plots(
         shown = {name: part(own, "random") for name, own in played.items()}
         if not all(shown.values()):
             return []
-    label = None
+    label = "push impulse, as a fraction of the ankle limit"
     if directional:
         fits = {name: mean_over_directions(*pushes(own)[:2], won(own))
                 for name, own in shown.items()}  # fmt: skip
@@ -82,7 +82,6 @@ def draw_plots(
         fall,
         {name: (fraction[name], won(own)) for name, own in shown.items()},
         {name: fit_logistic(fraction[name], won(own)) for name, own in shown.items()},
-        unit="fraction",
         xlabel=label,
     )
     curve = _draw_curve(folder / CURVE, fits, timesteps or {}) if directional else []

@@ -1,9 +1,7 @@
 """FFmpeg, fed frame by frame."""
 
-from __future__ import annotations
-
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,43 +25,45 @@ def check_video(path: str | Path) -> None:
         raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=path)
 
 
-class Encoder:
-    """FFmpeg, fed frame by frame; the file takes its name when the block ends well."""
+@contextmanager
+def encoded(
+    path: Path, size: tuple[int, int], rate: float
+) -> Iterator[Callable[[np.ndarray], None]]:
+    """FFmpeg: yields what takes the frames; the file takes its name when the block ends well.
 
-    def __init__(self, path: Path, size: tuple[int, int], rate: float):
-        self.path, self.size, self.rate = path, size, rate
-        self.part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix.lower()}")
+    Raises PoiseError if the file cannot be written.
+    """
+    import imageio_ffmpeg
 
-    def __enter__(self) -> Encoder:
-        import imageio_ffmpeg
+    part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix.lower()}")
+    writer = imageio_ffmpeg.write_frames(
+        str(part), size, fps=rate, macro_block_size=2, quality=None, ffmpeg_log_level="error",
+        **FORMS[path.suffix.lower()],
+    )  # fmt: skip
 
-        self.writer = imageio_ffmpeg.write_frames(
-            str(self.part), self.size, fps=self.rate, macro_block_size=2, quality=None,
-            ffmpeg_log_level="error", **FORMS[self.path.suffix.lower()],
-        )  # fmt: skip
-        with self._reported():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.writer.send(None)
-        return self
+    def send(frame: np.ndarray) -> None:
+        with _reported(path):
+            writer.send(np.ascontiguousarray(frame))
 
-    def send(self, frame: np.ndarray) -> None:
-        with self._reported():
-            self.writer.send(np.ascontiguousarray(frame))
+    with _reported(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with _reported(path):
+            writer.send(None)
+        yield send
+        with _reported(path):
+            writer.close()
+            os.replace(part, path)
+    finally:
+        writer.close()
+        part.unlink(missing_ok=True)
 
-    def __exit__(self, failure: type | None, *_: object) -> None:
-        try:
-            with self._reported():
-                self.writer.close()
-                if failure is None:
-                    os.replace(self.part, self.path)
-        finally:
-            self.part.unlink(missing_ok=True)
 
-    @contextmanager
-    def _reported(self) -> Iterator[None]:
-        """FFmpeg's troubles as an error of ours."""
-        try:
-            yield
-        except (OSError, RuntimeError) as error:
-            reason = getattr(error, "strerror", None) or str(error).strip().splitlines()[0]
-            raise PoiseError(f"{self.path}: the video cannot be written ({reason})") from error
+@contextmanager
+def _reported(path: Path) -> Iterator[None]:
+    """FFmpeg's troubles as an error of ours."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        reason = getattr(error, "strerror", None) or str(error).strip().splitlines()[0]
+        raise PoiseError(f"{path}: the video cannot be written ({reason})") from error

@@ -76,7 +76,7 @@ def polar_envelope(
             _, high = closed(s.x, s.high)
             ax.fill_between(theta, low, high, color=look(s.index).colour, alpha=0.2, lw=0, zorder=3,
                             gid=tag(s.index, detail=not small))  # fmt: skip
-            draw_line(ax, s, theta, y, s.name, 2.0)
+            draw_line(ax, s, theta, y, s.name)
         ends = [top] if small else [
             draw_marks(ax, s, ".3g", x=np.radians(s.x), bars=False, reach=top) for s in shown
         ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 
 from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, RGB
@@ -15,9 +16,9 @@ INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 
 CARDS = {"light": "#ffffff", "dark": "#1a1e22"}  # scheme → what is drawn on, as in report.css
 CONTRAST = 3.0  # to the card: WCAG's least for graphics
-QUANTITIES = {"com": COM, "cop": COP, "capture": CAPTURE_POINT}
+VARIABLES = {"com": COM, "cop": COP, "capture": CAPTURE_POINT}
 DRAWN = {f"s{k}": to_rgb(colour) for k, colour in enumerate(SERIES)} | {
-    name: quantity.colour for name, quantity in QUANTITIES.items()
+    name: quantity.colour for name, quantity in VARIABLES.items()
 }  # variable → colour of a series or a quantity
 ROLES = {"card": "white", "ink": INK, "muted": GREY, "rule": PALE}  # report.css gives both schemes
 NAMES = {to_hex(colour): name for name, colour in reversed(DRAWN.items())} | {
@@ -57,5 +58,10 @@ def contrast(first: RGB, second: RGB) -> float:
 
 def luminance(colour: RGB) -> float:
     """WCAG's relative luminance, 0 to 1."""
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return float(linear_rgb(colour) @ [0.2126, 0.7152, 0.0722])
+
+
+def linear_rgb(colour: Sequence[float]) -> np.ndarray:
+    """An sRGB colour (3,) as light adds up; both of 0 to 1."""
+    c = np.asarray(colour, dtype=float)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)

@@ -17,7 +17,7 @@ from poise.envs.viewing.offscreen import OffScreen
 from poise.envs.viewing.overlays import BAR, SPHERE, Mark, draw
 from poise.envs.viewing.renderer import LOOK_AT
 
-from .encoder import Encoder
+from .encoder import encoded
 from .palette import ORANGE
 
 RATE = 25.0  # [1/s] of the frames
@@ -127,8 +127,8 @@ def write_playback(
     Raises PoiseError if nothing can be drawn or encoded here, or the file cannot be written.
     """
     count = 0
-    with Encoder(path, size, RATE) as video:
+    with encoded(path, size, RATE) as send:
         for frame in playback_frames(robot, qpos, dt, skeleton, size):
-            video.send(frame)
+            send(frame)
             count += 1
     return count

@@ -1,7 +1,6 @@
 """Rates: falls over the size of the push, recoveries at the levels of a factor; rows of values."""
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,13 +15,6 @@ from .palette import GREY
 from .series import Series, draw_line, draw_marks, rate_series
 from .style import Out, headline, legend_below, look, saved_figure
 
-Unit = Literal["N·s", "N·s/kg", "fraction"]
-IMPULSE_LABEL = {
-    "N·s": "push impulse J [N·s]",
-    "N·s/kg": "push impulse J/m [N·s/kg]",
-    "fraction": "push impulse, as a fraction of the ankle limit",
-}
-IMPULSE_FORMAT = {"N·s": "{:.1f} N·s", "N·s/kg": "{:.3f} N·s/kg", "fraction": "{:.2f}"}
 SIZE = 7.2, 4.8  # [in]
 BINS = 8
 
@@ -32,9 +24,8 @@ def fall_probability(
     trials: Mapping[str, tuple[ArrayLike, ArrayLike]],
     fits: Mapping[str, LogisticFit] | None = None,
     *,
-    unit: Unit = "N·s",
     bins: int = BINS,
-    xlabel: str | None = None,
+    xlabel: str = "push impulse, as a fraction of the ankle limit",
 ) -> None:
     """Fraction of trials that ended in a fall against the impulse, with the fitted curves.
 
@@ -43,12 +34,11 @@ def fall_probability(
 
     Args:
         out: PNG file to write, or a place in a page.
-        trials: name → (impulse, recovered), two arrays of shape (n,).
+        trials: name → (fraction of a limit, recovered), two arrays of shape (n,).
         fits: name → fit of these trials. A fit whose J50 is only a bound has no curve.
-        unit: of the impulse.
         bins: largest number of dots per controller; with at most as many distinct impulses, each of
             them is a bin.
-        xlabel: instead of the label that belongs to the unit, as for another kind of fraction.
+        xlabel: what the impulse is a fraction of.
 
     Raises:
         ValueError: trials that `fit_logistic` refuses too.
@@ -63,7 +53,7 @@ def fall_probability(
             style, fit, label = look(k), fits.get(name), name
             if fit is not None:
                 sign = {None: "=", "lower": "≥", "upper": "≤"}[fit.bound]
-                label = f"{name}: J50 {sign} {IMPULSE_FORMAT[unit].format(fit.j50)}"
+                label = f"{name}: J50 {sign} {fit.j50:.2f}"
             x, y = np.zeros(0), np.zeros(0)
             if fit is not None and fit.bound is None:
                 x = np.linspace(impulse.min(), impulse.max(), 100)
@@ -74,9 +64,9 @@ def fall_probability(
             shift = (k - (len(trials) - 1) / 2) * 0.006 * np.ptp(impulse)
             found = trial_bins(impulse, recovered, bins)
             s = rate_series(name, k, [b[0] for b in found], [b[1:] for b in found])
-            draw_line(ax, s, x, y, label, 2.0)
+            draw_line(ax, s, x, y, label)
             draw_marks(ax, s, ".0%", x=s.x + shift)
-        ax.set_xlabel(xlabel or IMPULSE_LABEL[unit])
+        ax.set_xlabel(xlabel)
         headline(figure, "Pushes that are not recovered", "Bars: 95 % intervals.")
         legend_below(figure, columns=2)
 
@@ -101,7 +91,7 @@ def level_curves(
             ax.axvspan(standard - edge, standard + edge, color=GREY, alpha=0.12, lw=0, gid=tag())
         for k, s in enumerate(series):
             shift = (k - (len(series) - 1) / 2) * min(0.02, 0.2 / len(series))
-            draw_line(ax, s, s.x + shift, s.y, s.name, 2.0)
+            draw_line(ax, s, s.x + shift, s.y, s.name)
             draw_marks(ax, s, ".0%", x=s.x + shift)
         ax.set_xlim(-edge, len(levels) - 1 + edge)
         ax.set_xticks(range(len(levels)), [short(level_text(level), 14) for level in levels])
@@ -139,7 +129,7 @@ def phase_curves(out: Out, series: Sequence[Series]) -> None:
         top = max(float(np.nanmax([s.y, s.high])) for s in series)
         for k, s in enumerate(series):
             shift = 0.007 * (k - (len(series) - 1) / 2)
-            draw_line(ax, s, s.x + shift, s.y, s.name, 2.0)
+            draw_line(ax, s, s.x + shift, s.y, s.name)
             top = max(top, draw_marks(ax, s, ".1f", x=s.x + shift, reach=top))
         ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.04 * top), ylabel="J50 [N·s]")
         ax.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0])

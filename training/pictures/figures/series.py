@@ -72,10 +72,10 @@ def rate_series(
     ])  # fmt: skip
 
 
-def draw_line(ax: Axes, s: Series, x: ArrayLike, y: ArrayLike, label: str, width: float) -> None:
+def draw_line(ax: Axes, s: Series, x: ArrayLike, y: ArrayLike, label: str) -> None:
     """The line of a series; its entry of the legend has the mark too."""
     style = look(s.index)
-    ax.plot(x, y, color=style.colour, ls=style.line, lw=width, marker=style.marker, markevery=[],
+    ax.plot(x, y, color=style.colour, ls=style.line, marker=style.marker, markevery=[],
             label=label, zorder=4, gid=tag(s.index))  # fmt: skip
 
 

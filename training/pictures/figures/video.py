@@ -14,7 +14,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.renderer import SceneRenderer
 
-from .encoder import Encoder, check_video
+from .encoder import check_video, encoded
 from .style import saved_figure
 
 INK = (20, 20, 20)  # of names over pictures
@@ -61,8 +61,7 @@ def record(
     size, fps = size or usual_size, usual_rate if fps is None else fps
     _check(path, fps, slow_motion, size)
     with Episode(env, act, reset_kwargs, size, camera) as episode:
-        every, rate = _drawn(episode.base, fps, slow_motion)
-        frames = _film([episode], Path(path), size, every, rate, lambda: episode.frame)
+        frames, rate = _film([episode], Path(path), fps, slow_motion, lambda: episode.frame)
     return {
         "path": str(path),
         "frames": frames,
@@ -98,14 +97,12 @@ def record_together(
     own = list(episodes.values())
     if not own or len({(each.base.config.policy_period, each.size) for each in own}) != 1:
         raise ConfigError("give one or more, of one policy period and size", field="episodes")
-    width, height = own[0].size
-    _check(path, fps, 1.0, (width, height))
-    every, rate = _drawn(own[0].base, fps, 1.0)
+    _check(path, fps, 1.0, own[0].size)
 
     def frame() -> np.ndarray:
         return np.hstack([_labelled(name, each) for name, each in episodes.items()])
 
-    return _film(own, Path(path), (width * len(own), height), every, rate, frame)
+    return _film(own, Path(path), fps, 1.0, frame)[0]
 
 
 class Episode:
@@ -165,27 +162,23 @@ class Episode:
         self.renderer.close()
 
 
-def _drawn(env: BalanceEnv, fps: float, slow_motion: float) -> tuple[int, float]:
-    """How many policy steps apart frames are, and how many of them the video has a second."""
-    period = env.config.policy_period * slow_motion
-    every = max(1, round(1.0 / (fps * period)))
-    return every, 1.0 / (every * period)
-
-
 def _film(
-    episodes: Sequence[Episode],
-    path: Path,
-    size: tuple[int, int],
-    every: int,
-    rate: float,
+    episodes: Sequence[Episode], path: Path, fps: float, slow_motion: float,
     frame: Callable[[], np.ndarray],
-) -> int:
-    """Play all to their ends at the same time and write what `frame` gives; how many frames."""
+) -> tuple[int, float]:  # fmt: skip
+    """Play all to their ends at the same time and write what `frame` gives of them side by side.
+
+    Returns how many frames there are, and how many the video has a second.
+    """
+    period = episodes[0].base.config.policy_period * slow_motion
+    every = max(1, round(1.0 / (fps * period)))  # policy steps from frame to frame
+    rate = 1.0 / (every * period)
+    width, height = episodes[0].size
     frames, step = 1, 0
-    with Encoder(path, size, rate) as video:
+    with encoded(path, (width * len(episodes), height), rate) as send:
         for each in episodes:
             each.start()
-        video.send(frame())
+        send(frame())
         while not all(each.done for each in episodes):
             playing = [each for each in episodes if not each.done]
             for each in playing:
@@ -195,9 +188,9 @@ def _film(
             if step % every == 0 or ended:
                 for each in playing:
                     each.draw()
-                video.send(frame())
+                send(frame())
                 frames += 1
-    return frames
+    return frames, rate
 
 
 def _labelled(name: str, episode: Episode) -> np.ndarray:

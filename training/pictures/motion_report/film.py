@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.viewing.renderer import SceneRenderer
 from poise.training.benchmarking.trials.play import Watch
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.pictures.figures.encoder import Encoder
+from poise.training.pictures.figures.encoder import encoded
 from poise.training.pictures.figures.video import usual
 from poise.training.pictures.sessions.ghost import Ghost, ghost_of
 
 
-class Film:
+class Film(ExitStack):
     """Films the first trial of `follow`, which calls it; use as a context, which writes the file.
 
     Args:
@@ -32,6 +32,7 @@ class Film:
         self, path: Path, size: tuple[int, int] = (640, 480),
         others: Callable[[Trial], Watch] | None = None,
     ):  # fmt: skip
+        super().__init__()
         self.path, self.size, self.others = path, size, others
         self.rate = usual(path)[1]
         self.frames, self._first = 0, True
@@ -39,17 +40,8 @@ class Film:
         self._ghost: Ghost | None = None
 
     def __enter__(self) -> Film:
-        self._encoder = Encoder(self.path, self.size, self.rate)
-        self._encoder.__enter__()
+        self._send = self.enter_context(encoded(self.path, self.size, self.rate))
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:  # fmt: skip
-        if self._renderer is not None:
-            self._renderer.close()
-        self._encoder.__exit__(kind, error, trace)
 
     def __call__(self, trial: Trial) -> Watch:
         """What watches a trial."""
@@ -69,6 +61,7 @@ class Film:
         if self._renderer is None:
             width, height = self.size
             self._renderer = SceneRenderer(env.simulation, False, width, height)
+            self.callback(self._renderer.close)
             self._ghost = ghost_of(env)
         if env.simulation.time < self.frames / self.rate - 1e-9:
             return
@@ -76,5 +69,5 @@ class Film:
         posture = None if self._ghost is None else self._ghost.posture(time)
         frame = self._renderer.render(posture)
         assert frame is not None  # it is open, and off-screen
-        self._encoder.send(frame)
+        self._send(frame)
         self.frames += 1

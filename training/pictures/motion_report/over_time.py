@@ -35,7 +35,7 @@ def zmp_picture(judged: Feasibility, trace: Trace | None = None) -> Picture:
         caption += " Measured is the centre of pressure under the soles as they stand."
         key["measured"] = sample(COM.hexadecimal, "-")
     key["soles"] = area_sample(**SOLES)
-    return Picture("ZMP inside the soles", _zmp(judged, trace), caption, key=key)
+    return Picture("ZMP inside the soles", _zmp(judged, trace), caption, key)
 
 
 def errors_picture(trace: Trace) -> Picture:

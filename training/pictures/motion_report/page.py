@@ -18,16 +18,15 @@ class Picture(NamedTuple):
 
     Attributes:
         title: its heading.
-        out: the drawing.
+        out: the drawing; of the class "wide" it keeps its size on a narrow screen, and is moved by
+            hand there.
         caption: what it shows, below it.
-        wide: whether it keeps its size on a narrow screen, and is moved there by hand.
         key: name → sample of a line in the legend.
     """
 
     title: str
     out: Inline
     caption: str
-    wide: bool = False
     key: dict[str, Markup] = {}  # noqa: RUF012 - a default that nothing changes
 
 

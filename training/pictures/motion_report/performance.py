@@ -101,6 +101,6 @@ def graph_pictures(graph: MotionGraph) -> list[Picture]:
                       "is. Clips in a broken outline are not in the part in which every clip "
                       "reaches every other.")  # fmt: skip
     return [
-        Picture("Which clip may follow which", matrix, matrix_caption, count > 9, reasons),
+        Picture("Which clip may follow which", matrix, matrix_caption, reasons),
         Picture("The graph", circle, circle_caption),
     ]

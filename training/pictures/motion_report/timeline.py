@@ -48,7 +48,7 @@ def timeline_picture(record: Mapping[str, Any], trace: Trace | None = None) -> P
                     "of mass is where the motion has it. Shaded is the push.")  # fmt: skip
         key |= {"tempo": sample(*TEMPO), "β": sample(GREEN, "-")}
     svg = _timeline(played, duration, trace)
-    return Picture("The script", svg, caption, wide=True, key=key)
+    return Picture("The script", svg, caption, key)
 
 
 def _timeline(played: Sequence[Part], duration: float, trace: Trace | None) -> Inline:

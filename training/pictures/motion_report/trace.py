@@ -24,7 +24,6 @@ class Trace:
         bodies, com: (n,) mean distance of the bodies, and that of the CoM, from the motion [m].
         cop: (n, 2) the measured centre of pressure, in the heading frame of the soles from their
             middle [m]; of a motion with steps from where that is at its begin.
-        contacts: (n, nc) whether each sole bears load.
         pushes: (start, duration) of each push [s].
         fallen: whether the robot fell.
     """
@@ -37,7 +36,6 @@ class Trace:
     bodies: np.ndarray
     com: np.ndarray
     cop: np.ndarray
-    contacts: np.ndarray
     pushes: tuple[tuple[float, float], ...]
     fallen: bool
 
@@ -63,15 +61,14 @@ class Tracer:
         stance = self._footing.stance if steps is None else Stance.of(state)
         joints, bodies, _, com = tracking_errors(env, self._reference, stance)
         away = state.com - self._reference.com
-        scale = Tempo().distance * env.robot.height_com
-        if env.tempo.waits:
-            scale = env.tempo.distance * env.robot.height_com
+        tempo = env.tempo if env.tempo.waits else Tempo()
+        scale = tempo.distance * env.robot.height_com
         beta = np.exp(-float(away[:2] @ away[:2]) / scale**2)
         point = (state.cop - self._reference.origin[:2]) @ self._reference.turn[:2, :2]
         if steps is not None:
             point = point - steps.sample(0.0).places[:, 0, :2].mean(axis=0)
         now = [env.simulation.time, env.motion_time, beta, np.sqrt(joints), bodies, com, *point]
-        self._rows.append(np.concatenate([now, state.contacts > 0.5]))
+        self._rows.append(np.array(now))
 
     def trace(self) -> Trace:
         """What has been seen."""
@@ -82,4 +79,4 @@ class Tracer:
         tempo[0] = tempo[1] if len(tempo) > 1 else 1.0
         beta, joints, bodies, com = rows[:, 2:6].T
         return Trace(time, motion_time, tempo, beta, joints, bodies, com, rows[:, 6:8],
-                     rows[:, 8:], self._pushes, self._fallen)  # fmt: skip
+                     self._pushes, self._fallen)  # fmt: skip

@@ -6,44 +6,51 @@ import base64
 import csv
 import gzip
 import io
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple, cast
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, cast
 
 from markupsafe import Markup
 
 from poise.training.benchmarking.results.read import Results
-from poise.training.running.columns import Entry, Figure, known
+from poise.training.running.columns import NONE, P_VALUE, Entry, Figure
 from poise.training.running.summary import both_ends
 
 
-class Column(NamedTuple):
-    """A column.
+@dataclass(frozen=True)
+class Text:
+    """A column of texts; one of numbers is a `Figure`.
 
     Attributes:
-        key: its name in the CSV.
-        title: its heading.
-        note: what it means, in a few words; shown when it is pointed at.
-        interval: whether its cells have one; the CSV then has key_low and key_high too.
+        key: in an entry, whose value is a text or a `Cell`; and its name in the CSV.
+        heading, words: as of a figure.
+        head: whether it says what the row is of.
     """
 
     key: str
-    title: str
-    note: str = ""
-    interval: bool = False
+    heading: str
+    words: str = ""
+    head: bool = False
+    csv: ClassVar[str] = ""
+    ends: ClassVar[str] = ""
+
+
+Column = Figure | Text
+CONTROLLER = Text("controller", "controller", head=True)
 
 
 class Cell(NamedTuple):
     """A value, how it is written, and its 95 % interval if it has one.
 
-    `series` marks the name of a controller, which is shown with its sign.
+    `head` marks what the row is of: the name of a controller.
     """
 
     value: float | str | None
     text: str
     ends: tuple[float, float] | None = None
     ends_text: str = ""
-    series: int | None = None
+    head: bool = False
 
     @property
     def sort_key(self) -> str:
@@ -64,21 +71,19 @@ class Table:
     caption: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]
-    notes: Sequence[str] = field(default_factory=tuple)
 
     def csv(self) -> str:
         """The numbers as they are, not as they are shown."""
         header = []
         for column in self.columns:
-            header.append(column.key)
-            if column.interval:
-                header += [f"{column.key}_low", f"{column.key}_high"]
+            name = column.csv or column.key
+            header += [name, f"{name}_low", f"{name}_high"] if column.ends else [name]
         lines = []
         for row in self.rows:
             line: list[float | str | None] = []
             for column, cell in zip(self.columns, row, strict=True):
                 line.append(cell.value)
-                if column.interval:
+                if column.ends:
                     line += cell.ends or (None, None)
             lines.append(line)
         return csv_text(header, lines)
@@ -93,7 +98,7 @@ class Table:
         count = len(self.columns)
         kept = [k for k in range(count) if any(row[k].value is not None for row in self.rows)]
         rows = [[row[k] for k in kept] for row in self.rows]
-        return Table(self.name, self.caption, [self.columns[k] for k in kept], rows, self.notes)
+        return Table(self.name, self.caption, [self.columns[k] for k in kept], rows)
 
 
 class Download(NamedTuple):
@@ -134,66 +139,49 @@ def cell(
 ) -> Cell:
     """A number with its interval, written by a format; `sign` before it, as in ≥ 25."""
     if value is None:
-        return Cell(None, "–")
+        return Cell(None, NONE)
     shown = f"{number_text(ends[0], form)} to {number_text(ends[1], form)}" if ends else ""
     return Cell(value, f"{sign}{number_text(value, form)}", ends, shown)
 
 
 def p_cell(value: float | None) -> Cell:
     """A p-value; how small it is below 0.001 says nothing to people."""
-    text = "–" if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
+    text = NONE if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
     return Cell(value, text)
 
 
-def name_cell(name: str, series: int) -> Cell:
-    """A controller's name with its sign."""
-    return Cell(name, name, series=series)
-
-
-def figure_column(figure: Figure) -> Column:
-    """The column of a figure."""
-    return Column(figure.csv or figure.key, figure.heading, figure.words, bool(figure.ends))
-
-
-def figure_cell(figure: Figure, entry: Entry) -> Cell:
-    """A figure of an entry with its interval: in full, and as it is shown."""
-    value, ends, scale = figure.value(entry), both_ends(figure.interval(entry)), figure.scale
-    if value is None:
-        return cell(None)
-    around = (scale * ends[0], scale * ends[1]) if ends else None
-    shown = cell(scale * value, figure.form, around, figure.sign(entry))
-    return shown._replace(value=value, ends=ends)
-
-
-def figure_table(
-    results: Results,
-    order: Sequence[str],
-    key: str,
-    table: Table,
-    figures: Sequence[Figure],
-    first: Callable[[Any], list[Cell]],
+def entry_table(
+    name: str, caption: str, columns: Sequence[Column], entries: Sequence[Entry]
 ) -> Table | None:
-    """A table of the entries that the controllers have under `key`; None without any.
+    """A row for each entry, without columns in which none has a value; None without any figure."""
+    rows = [[_cell_of(each, entry) for each in columns] for entry in entries]
+    figures = [k for k, each in enumerate(columns) if isinstance(each, Figure)]
+    if all(row[k].value is None for row in rows for k in figures):
+        return None
+    return Table(name, caption, columns, rows).without_empty()
 
-    Args:
-        results, order: the controllers, in this order.
-        key: of a list of entries of a controller, such as "walks".
-        table: name, caption, and the columns between the controller and the figures.
-        figures: the columns after them; those that no entry has are left out.
-        first: the cells of the table's own columns, from an entry.
-    """
-    rows = [
-        (name, entry)
+
+def entries_of(results: Results, order: Sequence[str], key: str) -> list[Entry]:
+    """The entries that the controllers have under a key such as "walks", with their names."""
+    return [
+        {**entry, "controller": name}
         for name in order
         for entry in cast(Sequence[Entry], results.summary["controllers"][name].get(key, ()))
     ]
-    shown = known(figures, [entry for _, entry in rows])
-    if not shown:
-        return None
-    columns = [Column("controller", "controller"), *table.columns, *map(figure_column, shown)]
-    cells = [
-        [name_cell(name, results.controllers.index(name)), *first(entry),
-         *(figure_cell(each, entry) for each in shown)]
-        for name, entry in rows
-    ]  # fmt: skip
-    return Table(table.name, table.caption, columns, cells)
+
+
+def _cell_of(column: Column, entry: Entry) -> Cell:
+    """What an entry has of a column: a figure in full, and as it is shown."""
+    if isinstance(column, Text):
+        text = entry[column.key]
+        return (
+            text if isinstance(text, Cell) else Cell(text or None, text or NONE, head=column.head)
+        )
+    value, ends = column.value(entry), both_ends(column.interval(entry))
+    if value is None or math.isnan(value):
+        return cell(None)
+    if column is P_VALUE:
+        return p_cell(value)
+    around = (column.scale * ends[0], column.scale * ends[1]) if ends else None
+    shown = cell(column.scale * value, column.form, around, column.sign(entry))
+    return shown._replace(value=value, ends=ends)

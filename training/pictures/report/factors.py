@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypedDict, cast
-
-from markupsafe import Markup
+from typing import cast
 
 from poise.training.benchmarking.results.read import Results
 from poise.training.pictures.figures.envelope import right_angle
@@ -20,10 +18,12 @@ from poise.training.running.columns import (
     SWAY,
     TRIED,
     Entry,
+    Figure,
 )
-from poise.training.running.summary import Level, MarginFigures
+from poise.training.running.summary import Level
 
-from .cells import Cell, Column, Table, cell, figure_cell, figure_column, name_cell, p_cell
+from .cells import CONTROLLER, Cell, Column, Table, Text, cell, entry_table
+from .tables import TRIAL
 
 TITLES = {
     "duration": "duration of the push [s]",
@@ -38,13 +38,6 @@ TITLES = {
 }
 
 
-class FactorPlot(TypedDict):
-    """A picture with its title."""
-
-    title: str
-    picture: Markup
-
-
 def factor_levels(results: Results) -> list[tuple[str, str, Level]]:
     """(controller, factor, level's entry) of all levels in the summary."""
     return [
@@ -55,23 +48,19 @@ def factor_levels(results: Results) -> list[tuple[str, str, Level]]:
     ]
 
 
-def factor_plots(results: Results, order: Sequence[str]) -> list[FactorPlot]:
-    """A picture of every factor, controllers as in `order`."""
-    pictures: list[FactorPlot] = []
+def factor_plots(results: Results, order: Sequence[str]) -> list[dict[str, str]]:
+    """A title and a picture of every factor, controllers as in `order`."""
+    pictures: list[dict[str, str]] = []
     every = factor_levels(results)
     for factor in dict.fromkeys(factor for _, factor, _ in every):
-        entries: dict[str, list[Level]] = {}
-        for name, own_factor, level in every:
-            if own_factor == factor:
-                entries.setdefault(name, []).append(level)
-        levels = list(dict.fromkeys(e["level"] for each in entries.values() for e in each))
-        standard = [levels.index(e["level"]) for each in entries.values() for e in each
-                    if e["standard"]]  # fmt: skip
+        entries = [(name, level) for name, other, level in every if other == factor]
+        levels = list(dict.fromkeys(level["level"] for _, level in entries))
+        standard = [levels.index(level["level"]) for _, level in entries if level["standard"]]
         found = []
         for name in order:
-            own = entries.get(name, [])
-            counts = [(e["recovered"], e["trials"]) for e in own]
-            at = [levels.index(e["level"]) for e in own]
+            own = [level for other, level in entries if other == name]
+            counts = [(level["recovered"], level["trials"]) for level in own]
+            at = [levels.index(level["level"]) for level in own]
             found.append(rate_series(name, results.controllers.index(name), at, counts))
         title = TITLES.get(factor, factor)
         told = "; ".join(
@@ -87,128 +76,95 @@ def factor_plots(results: Results, order: Sequence[str]) -> list[FactorPlot]:
 
 def factor_table(results: Results) -> Table | None:
     """Every level of every factor; None without factors."""
-    figures = (*TRIED, RECOVERED, *AGAINST)
-    columns = [
-        Column("controller", "controller"),
-        Column("factor", "factor"),
-        Column("level", "level"),
-        *map(figure_column, (*figures, P_VALUE)),
-    ]
-    rows = [
-        [
-            name_cell(name, results.controllers.index(name)),
-            Cell(factor, factor),
-            Cell(level["level"], level_text(level["level"])
-                 + (" (standard)" if level["standard"] else "")),
-            *(figure_cell(each, level) for each in figures),
-            p_cell(level["p_mcnemar"]),
-        ]
-        for name, factor, level in factor_levels(results)
-    ]  # fmt: skip
     caption = "Recovery rate at every level of every factor, lost and won against the standard."
-    return Table("factors", caption, columns, rows) if rows else None
+    columns = (CONTROLLER, Text("factor", "factor"), Text("level", "level"), *TRIED, RECOVERED,
+               *AGAINST, P_VALUE)  # fmt: skip
+    rows = []
+    for name, factor, level in factor_levels(results):
+        shown = level_text(level["level"]) + (" (standard)" if level["standard"] else "")
+        own = {"controller": name, "factor": factor, "level": Cell(level["level"], shown)}
+        rows.append({**level, **own})
+    return entry_table("factors", caption, columns, rows)
 
 
 def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
     """The largest loss of each controller by each factor; None without factors."""
     found = factor_levels(results)
     factors = list(dict.fromkeys(factor for _, factor, _ in found))
-    columns = [Column("controller", "controller"), Column("standard", "standard case")]
-    columns += [Column(f, f.replace("_", " "), TITLES.get(f, "")) for f in factors]
+    texts = [Text(f, f.replace("_", " "), TITLES.get(f, "")) for f in factors]
     rows = []
     for name in order:
         own = [(f, level) for other, f, level in found if other == name]
         base = [level["recovered_rate"] for _, level in own if level["standard"]]
         if not base:
             continue
-        row = [name_cell(name, results.controllers.index(name)), cell(base[0], ".0%")]
+        row: dict[str, object] = {"controller": name, "standard": base[0]}
         for factor in factors:
             levels = [level for f, level in own if f == factor and not level["standard"]]
             worst = min(levels, key=lambda level: level["recovered_rate"], default=None)
-            if worst is None:
-                row.append(cell(None))
-                continue
-            change = 100.0 * (worst["recovered_rate"] - base[0])
-            shown = cell(change, "+.0f" if abs(change) >= 0.5 else ".0f")
-            row.append(shown._replace(ends_text=f"at {level_text(worst['level'])}"))
+            row[factor] = cell(None) if worst is None else _change(worst, base[0])
         rows.append(row)
     caption = "Change of the recovery rate at the worst level of each factor, in percent points."
-    return Table("sensitivity", caption, columns, rows) if rows else None
+    standard = Figure("standard", "standard case", ".0%")
+    return entry_table("sensitivity", caption, [CONTROLLER, standard, *texts], rows)
+
+
+def _change(level: Level, standard: float) -> Cell:
+    """How much more is recovered at a level than in the standard case [percent points]."""
+    change = 100.0 * (level["recovered_rate"] - standard)
+    shown = cell(change, "+.0f" if abs(change) >= 0.5 else ".0f")
+    return shown._replace(ends_text=f"at {level_text(level['level'])}")
 
 
 def indicators(results: Results, order: Sequence[str]) -> Table | None:
     """EUROBENCH's indicators; None where no standard pushes were played."""
-    entries = results.summary["controllers"]
-    order = [name for name in order if "eurobench" in entries[name]]
-    margins: dict[str, dict[float, MarginFigures]] = {
-        name: {margin["direction"]: margin for margin in entries[name]["eurobench"]["margins"]}
-        for name in order
-    }
-    angles = list(dict.fromkeys(angle for own in margins.values() for angle in own))
-    columns = [
-        Column("controller", "controller"),
-        *map(figure_column, SWAY),
-    ]
-    for angle in angles:
-        columns += [
-            Column(
-                f"margin_{angle:g}_{each.key}", f"{each.heading}, {right_angle(angle)}", each.words
-            )
-            for each in MARGINS
-        ]
-    rows = []
+    columns, rows = list(SWAY), []
     for name in order:
-        found = entries[name]["eurobench"]
-        row = [
-            name_cell(name, results.controllers.index(name)),
-            *(figure_cell(each, found) for each in SWAY),
-        ]
-        for angle in angles:
-            margin = margins[name].get(angle, MarginFigures(direction=angle))
-            row += [figure_cell(each, margin) for each in MARGINS]
+        if (found := results.summary["controllers"][name].get("eurobench")) is None:
+            continue
+        row: dict[str, object] = {**found, "controller": name}
+        for margin in found["margins"]:
+            place = f"margin_{margin['direction']:g}"
+            row |= {f"{place}_{key}": value for key, value in margin.items()}
+            columns += [
+                replace(each, key=f"{place}_{each.key}", bound=f"{place}_{each.bound}", unit="",
+                        name=f"{each.heading}, {right_angle(margin['direction'])}")
+                for each in MARGINS
+            ]  # fmt: skip
         rows.append(row)
     caption = "Indicators of simulated subjects, as EUROBENCH's protocols define them."
-    return Table("indicators", caption, columns, rows).without_empty() if rows else None
+    return entry_table("indicators", caption, (CONTROLLER, *dict.fromkeys(columns)), rows)
 
 
 def seed_table(results: Results) -> Table | None:
     """Interquartile means over training seeds and the worst seed; None without groups of seeds."""
-    columns = [Column("name", "runs"), Column("seeds", "seeds")]
-    figures = {each.key: (
-        replace(each, key="iqm", name=f"{each.heading}, IQM", unit="", ends="iqm_ci95",
-                words="interquartile mean over seeds", csv=f"{each.key}_iqm"),
-        replace(each, key="worst", name="worst seed", unit="", words="the smallest value of a seed",
-                csv=f"{each.key}_worst"),
-    ) for each in OVER_SEEDS}  # fmt: skip
-    columns += [figure_column(each) for pair in figures.values() for each in pair]
+    columns: list[Column] = [Text("name", "runs"), Figure("seeds", "seeds", ".0f")]
+    for each in OVER_SEEDS:
+        mean, worst = f"{each.key}_iqm", f"{each.key}_worst"
+        columns += [
+            replace(each, key=mean, name=f"{each.heading}, IQM", unit="", ends=f"{mean}_ci95",
+                    words="interquartile mean over seeds"),
+            replace(each, key=worst, name="worst seed", unit="",
+                    words="the smallest value of a seed"),
+        ]  # fmt: skip
     rows = []
     for group in results.summary["seeds"]:
-        row = [Cell(group["name"], group["name"]), cell(len(group["seeds"]), "d")]
-        for key, pair in figures.items():
-            row += [figure_cell(each, cast(Entry, group.get(key, {}))) for each in pair]
+        row: dict[str, object] = {"name": group["name"], "seeds": len(group["seeds"])}
+        for each in OVER_SEEDS:
+            figures = cast(Entry, group.get(each.key, {}))
+            row |= {f"{each.key}_{key}": value for key, value in figures.items()}
         rows.append(row)
-    if not rows:
-        return None
-    return Table("seeds", "Means over training seeds.", columns, rows).without_empty()
+    return entry_table("seeds", "Means over training seeds.", columns, rows)
 
 
 def error_table(results: Results) -> Table | None:
     """Trials in which a controller raised; None without any."""
-    columns = [
-        Column("controller", "controller"),
-        Column("trial", "trial"),
-        Column("seed", "seed"),
-        Column("error", "error"),
-    ]
+    caption = "Trials in which a controller raised an error; they count as not recovered."
     rows = [
-        [
-            name_cell(record.controller, results.controllers.index(record.controller)),
-            cell(record.trial, "d"),
-            Cell(int(record.line["seed"]), record.line["seed"]),
-            Cell(record.error, record.error),
-        ]
+        {**vars(record), "error": record.error,
+         "seed": Cell(int(record.line["seed"]), record.line["seed"])}
         for record in results.records
         if record.error
-    ]
-    caption = "Trials in which a controller raised an error; they count as not recovered."
-    return Table("errors", caption, columns, rows) if rows else None
+    ]  # fmt: skip
+    columns = (CONTROLLER, TRIAL, Text("seed", "seed"), Text("error", "error"))
+    return entry_table("errors", caption, columns, rows)

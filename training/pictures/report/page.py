@@ -36,7 +36,7 @@ from .worst_trials import (
 
 CROWD = 4  # of controllers; with more, bands and bars are shown for the one that is pointed at
 EMBEDDED = 600_000  # [bytes] trials.csv is embedded up to this size, beyond it packed
-PACKED = 2_500_000  # [bytes] up to this size
+PACKED = 2_500_000  # [bytes] up to this size; a longer one stays in the folder
 
 
 def write_report(
@@ -96,9 +96,10 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "smallest": report_tables.smallest(results, order),
         "losses": report_tables.losses(results, order),
     }
-    cases, notes = _cases(results, baseline, order, films, console)
+    cases, notes = _cases(results, films, console)
     envelope, own_envelopes = plots.envelopes(results)
     falls, curves = plots.falls(results)
+    trials = _file(results, TRIALS, TABLE_BYTES)
     return render_page("report.html.j2",
         summary=results.summary,
         trial_count=len({record.trial for record in results.records}),
@@ -123,17 +124,17 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         signal_keys=signal_keys(),
         notes=notes,
         facts=_facts(results),
-        trials=_trials(results),
-        summary_file=_summary_file(results),
+        trials=trials if trials.size <= PACKED else None,
+        summary_file=_file(results, SUMMARY, JSON_BYTES),
         crowded=len(order) > CROWD,
     )  # fmt: skip
 
 
 def _cases(
-    results: Results, baseline: str, order: Sequence[str], films: bool, console: Console
+    results: Results, films: bool, console: Console
 ) -> tuple[list[dict[str, object]], list[str]]:
     """The trials shown, and what to say of those that are not."""
-    cases = choose_exhibits(results, baseline, order)
+    cases = choose_exhibits(results, results.reference, results.summary["ranking"])
     notes: list[str] = []
     if not films:
         notes.append("The trials were not played again: the report was asked to go without.")
@@ -144,7 +145,7 @@ def _cases(
     shown = []
     for k, case in enumerate(cases, 1):
         played = []
-        for record in [case.record, *([case.baseline] if case.baseline else [])]:
+        for record in filter(None, (case.record, case.baseline)):
             key = (record.trial, record.controller)
             if films and key not in done:
                 console.print(f"playing trial {k} of {len(cases)} again: {record.controller}",
@@ -183,10 +184,9 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
     """A case for the template."""
     record = case.record
     trial = results.trial(record)
-    start = record.start
-    pushes = words.push_times(trial)
+    pushes = [(push.start, push.duration) for push in trial.pushes]
     # the last time worth showing
-    end = (record.fall_time if record.fallen else (start or 0.0) + 3.0) + AFTER
+    end = (record.fall_time if record.fallen else (record.start or 0.0) + 3.0) + AFTER
     parts = []
     for played in films:
         who, t = played.record, played.signals.t
@@ -250,15 +250,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     return [(name, str(value)) for name, value in rows if value is not None]
 
 
-def _trials(results: Results) -> Download | None:
-    """trials.csv, packed where it is long; None where it is too long for a page."""
-    text = read_text(results.folder / TRIALS, TABLE_BYTES)
-    if len(text) <= EMBEDDED:
-        return download(TRIALS, text)
-    packed = download(TRIALS, text, pack=True)
-    return packed if packed.size <= PACKED else None
-
-
-def _summary_file(results: Results) -> Download:
-    text = read_text(results.folder / SUMMARY, JSON_BYTES)
-    return download(SUMMARY, text, pack=len(text) > EMBEDDED)
+def _file(results: Results, name: str, most: int) -> Download:
+    """A file of the folder, packed where it is long."""
+    text = read_text(results.folder / name, most)
+    return download(name, text, pack=len(text) > EMBEDDED)

@@ -7,7 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from poise.training.benchmarking.metrics.played import DIRECTIONAL
-from poise.training.benchmarking.results.read import Record, Results
+from poise.training.benchmarking.results.read import Results
 from poise.training.benchmarking.statistics.fits import fit_logistic, trial_bins
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.trials.step_limits import DRAWN, line_name
@@ -16,12 +16,10 @@ from poise.training.pictures.figures.palette import GREY, INK
 from poise.training.pictures.figures.rates import BINS, fall_probability, forest
 from poise.training.pictures.figures.series import SIDES, Series, series
 from poise.training.pictures.figures.style import INLINE, Inline, look, sample
-from poise.training.running.columns import J50_MEAN
+from poise.training.running.columns import J50_MEAN, Entry
 from poise.training.running.summary import both_ends
-from poise.training.running.trial_figures import Interval
 
 from .cells import Download, csv_text, download
-from .tables import bound_of, per_direction
 
 SMALL = 2.2  # width of one controller's own picture [in]
 PARTS = {"envelope": "Standard pushes", "grid": "Grid of pushes", "random": "Random pushes",
@@ -121,28 +119,7 @@ def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
 
 
 def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]]]:
-    fraction, title = limit_fractions(results, part)
-    trials, fits = {}, {}
-    lines: list[tuple[object, ...]] = []
-    for name in results.controllers:
-        mine = [k for k, record in enumerate(results.records)
-                if record.controller == name and np.isfinite(fraction[k])]  # fmt: skip
-        recovered = np.array([results.records[k].recovered for k in mine])
-        trials[name] = fraction[mine], recovered
-        fits[name] = fit = fit_logistic(*trials[name])
-        lines += [
-            (part, name, *found, *wilson_interval(*found[1:]), fit.j50, fit.bound, fit.scale)
-            for found in trial_bins(*trials[name], BINS)
-        ]
-    told = "; ".join(f"{name} {'half at' if fit.bound is None else 'only a bound,'} {fit.j50:.2f}"
-                     for name, fit in fits.items())  # fmt: skip
-    out = Inline(f"Fraction of trials not recovered, over the {title}: {told}.")
-    fall_probability(out, trials, fits, unit="fraction", xlabel=title)
-    return out.svg, lines
-
-
-def limit_fractions(results: Results, part: str) -> tuple[np.ndarray, str]:
-    """Every record's push over the limit, NaN for those of other parts, and what of.
+    """The picture of a part, and the bins of each controller.
 
     Pushes by direction are measured by the ankle limit, as the summary has it.
     """
@@ -151,35 +128,47 @@ def limit_fractions(results: Results, part: str) -> tuple[np.ndarray, str]:
         for entry in results.summary["controllers"].values()
         for direction in (entry.get("directions", ()) if part in DIRECTIONAL else ())
     }
-
-    def fraction(record: Record) -> float:
-        if record.part != part:
-            return np.nan
-        limit = limits.get(record.direction)
-        return record.impulse / limit if limit else record.fraction
-
-    what = "ankle limit" if limits else results.summary["scale"]
-    found = np.array([fraction(record) for record in results.records])
-    return found, f"push, in fractions of the {what}"
+    title = f"push, in fractions of the {'ankle limit' if limits else results.summary['scale']}"
+    trials, fits = {}, {}
+    lines: list[tuple[object, ...]] = []
+    for name in results.controllers:
+        own = [record for record in results.of(name) if record.part == part]
+        shares = np.array([record.impulse / limits[record.direction]
+                           if record.direction in limits else record.fraction for record in own],
+                          dtype=float)  # fmt: skip
+        known = np.isfinite(shares)
+        trials[name] = shares[known], np.array([record.recovered for record in own])[known]
+        fits[name] = fit = fit_logistic(*trials[name])
+        lines += [
+            (part, name, *found, *wilson_interval(*found[1:]), fit.j50, fit.bound, fit.scale)
+            for found in trial_bins(*trials[name], BINS)
+        ]
+    told = "; ".join(f"{name} {'half at' if fit.bound is None else 'only a bound,'} {fit.j50:.2f}"
+                     for name, fit in fits.items())  # fmt: skip
+    out = Inline(f"Fraction of trials not recovered, over the {title}: {told}.")
+    fall_probability(out, trials, fits, xlabel=title)
+    return out.svg, lines
 
 
 def _envelopes(
     results: Results,
 ) -> tuple[str, list[Series], tuple[Sequence[float], Sequence[float]] | None]:
-    """Unit, series, and the ankle limit where J50 was measured."""
-    rows: dict[tuple[str, int], list[tuple[float, ...]]] = {}
-    measured = False
-    for name, index, entry in per_direction(results):
-        measured = measured or "j50" in entry
-        key = "j50" if measured else "fraction50"
-        value, around = cast(float, entry.get(key)), cast(Interval, entry.get(f"{key}_ci95"))
-        side = SIDES[bound_of(entry)]
-        row = (entry["direction"], value, *(both_ends(around) or NONE), side)
-        rows.setdefault((name, index), []).append(row)
-    order = results.summary["ranking"]
+    """Unit, series, and the ankle limit where J50 was measured; else they are of sectors."""
+    own: dict[str, Sequence[Entry]] = {}
+    for name in results.summary["ranking"]:
+        entry = results.summary["controllers"][name]
+        if aims := entry.get("directions") or entry.get("sectors"):
+            own[name] = cast(Sequence[Entry], aims)
+    measured = any("j50" in each for entries in own.values() for each in entries)
+    key = "j50" if measured else "fraction50"
+
+    def point(entry: Entry) -> tuple[float, ...]:
+        ends, side = both_ends(entry.get(f"{key}_ci95")) or NONE, SIDES[entry.get(f"{key}_bound")]
+        return entry["direction"], entry.get(key, np.nan), *ends, side
+
     found = [
-        series(name, index, sorted(points))
-        for (name, index), points in sorted(rows.items(), key=lambda item: order.index(item[0][0]))
+        series(name, results.controllers.index(name), sorted(map(point, entries)))
+        for name, entries in own.items()
     ]
     if not measured:
         return f"of the {results.summary['scale']}", found, None

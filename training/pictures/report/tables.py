@@ -1,9 +1,7 @@
 """The tables of a report, from a summary."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import cast
 
 from poise.training.benchmarking.evaluation.tables import places
 from poise.training.benchmarking.results.read import Results
@@ -30,105 +28,67 @@ from poise.training.running.columns import (
     TICK,
     TRIED,
     Entry,
+    Figure,
 )
-from poise.training.running.summary import Direction, Sector
-from poise.training.running.trial_figures import Bound
 
-from .cells import (
-    Cell,
-    Column,
-    Table,
-    cell,
-    figure_cell,
-    figure_column,
-    figure_table,
-    name_cell,
-    p_cell,
-)
+from .cells import CONTROLLER, Column, Table, Text, entries_of, entry_table
 from .worst_trials import smallest_lost
 
 SMALLEST = 3  # pushes listed for each controller
+RANK = Figure("rank", "#", ".0f",
+              words="by mean J50, else by the fraction of the limit, else by rate")  # fmt: skip
+DIRECTION = Figure("direction", "direction", "g", "°", "counter-clockwise from forward")
+TRIAL = Figure("trial", "trial", ".0f", words="its number in trials.csv")
+APART = {"lost": None, "won": None, "p_mcnemar": None}  # of one that nothing is compared with
+PAIR = (Text("b", "b", head=True), Text("a", "against a", head=True))
+#: of a record
+LOST = (
+    TRIAL,
+    Figure("fraction", "push", ".2f", words="fraction of the limit", csv="limit_fraction"),
+    Figure("impulse", "impulse", ".1f", "N·s"),
+    replace(DIRECTION, form=".0f"),
+    Figure("duration", "duration", ".2f", "s"),
+    Text("body", "body"),
+    Figure("fall_time", "fell at", ".2f", "s", "after the reset; none: stood, but not quiet"),
+    Text("why", "why"),
+)
 
 
-def ranking(results: Results, baseline: str) -> Table:
+def ranking(results: Results, baseline: str) -> Table | None:
     """Every controller with what the benchmark measures, the best first."""
-    order, ranked = results.controllers, results.summary["ranking"]
-    scale = results.summary["scale"]
-    against, rated = _against(results, baseline), results.summary["rated"]
+    entries, rated = results.summary["controllers"], results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
-    half = replace(HALF_AT, words=f"half of the trials survive, of the {scale}")
-    rate = replace(RECOVERED, words=f"fraction of all trials{mix}")
-    found = (J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST, half, rate,
-             replace(TRIED[0], words=f"that the rate is of{mix}"))  # fmt: skip
-    others = (FALLS[1], ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT)
-    columns = [
-        Column("rank", "#", "by mean J50, else by the fraction of the limit, else by rate"),
-        Column("controller", "controller"),
-        *map(figure_column, found),
-        *map(figure_column, (*AGAINST, P_VALUE, *others)),
+    columns = (
+        RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
+        replace(HALF_AT, words=f"half of the trials survive, of the {results.summary['scale']}"),
+        replace(RECOVERED, words=f"fraction of all trials{mix}"),
+        replace(TRIED[0], words=f"that the rate is of{mix}"),
+        *AGAINST, P_VALUE, FALLS[1], ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT,
+    )  # fmt: skip
+    rank, against = places(entries), _against(results, baseline)
+    rows = [
+        {**entries[name], **against.get(name, APART), "controller": name, "rank": rank[name]}
+        for name in results.summary["ranking"]
     ]
-    rows = []
-    rank = places(results.summary["controllers"])
-    for name in ranked:
-        entry = results.summary["controllers"][name]
-        pair = against.get(name, {})
-        rows.append([
-            cell(rank[name], "d"),
-            name_cell(name, order.index(name)),
-            *(figure_cell(each, entry) for each in found),
-            *(figure_cell(each, pair) for each in AGAINST),
-            p_cell(pair.get("p_mcnemar")),
-            *(figure_cell(each, entry) for each in others),
-        ])  # fmt: skip
     caption = f"Controllers, the best first. Lost and won are counted against {baseline}."
     if rated:
         caption = f"{caption[:-1]}; like the recovered rate, on the random {rated}."
-    return Table("ranking", caption, columns, rows).without_empty()
+    return entry_table("ranking", caption, columns, rows)
 
 
-def pairs(results: Results) -> Table:
-    """Every pair of controllers on the same trials."""
-    columns = [
-        Column("b", "b"),
-        Column("a", "against a"),
-        *map(figure_column, PAIRED),
-        figure_column(P_VALUE),
-        figure_column(GAIN),
-    ]
-    rows, order = [], results.controllers
-    for pair in results.summary["pairs"]:
-        rows.append([
-            *(name_cell(name, order.index(name)) for name in (pair["b"], pair["a"])),
-            *(figure_cell(each, pair) for each in PAIRED),
-            p_cell(pair.get("p_mcnemar")),
-            figure_cell(GAIN, pair),
-        ])  # fmt: skip
-    return Table("pairs", "All pairs on the same trials.", columns, rows).without_empty()
+def pairs(results: Results) -> Table | None:
+    """Every pair of controllers on the same trials; None of one alone."""
+    columns = (*PAIR, *PAIRED, P_VALUE, GAIN)
+    return entry_table("pairs", "All pairs on the same trials.", columns, results.summary["pairs"])
 
 
 def directions(results: Results) -> Table | None:
     """J50 or the fraction of the limit in every direction; None where no suite measured it."""
     entries = results.summary["controllers"].values()
     key = "directions" if any(entry.get("directions") for entry in entries) else "sectors"
-    columns = [Column("direction", "direction [°]", "counter-clockwise from forward")]
-    table = Table("directions", "Every direction.", columns, [])
-    return figure_table(results, results.controllers, key, table, (*TRIED, *AIMED),
-                        lambda entry: [cell(entry["direction"], "g")])  # fmt: skip
-
-
-def per_direction(results: Results) -> list[tuple[str, int, Direction | Sector]]:
-    """(controller, its number, entry) of all directions, or of all sectors where there are none."""
-    return [
-        (name, index, each)
-        for index, (name, entry) in enumerate(results.summary["controllers"].items())
-        for each in entry.get("directions") or entry.get("sectors", [])
-    ]
-
-
-def bound_of(entry: Direction | Sector) -> Bound:
-    """What a figure is only a bound of, if so."""
-    bound = entry.get("j50_bound") or entry.get("fraction50_bound")
-    return cast(Bound, bound)
+    columns: list[Column] = [CONTROLLER, DIRECTION, *TRIED, *AIMED]
+    found = entries_of(results, results.controllers, key)
+    return entry_table("directions", "Every direction.", columns, found)
 
 
 def _against(results: Results, baseline: str) -> dict[str, Entry]:
@@ -146,52 +106,17 @@ def _against(results: Results, baseline: str) -> dict[str, Entry]:
 
 def losses(results: Results, order: Sequence[str]) -> Table | None:
     """How often what was the cause of a loss; None in older results, and where nothing was lost."""
-    columns = [
-        Column("controller", "controller"),
-        figure_column(LOSSES),
-        Column("cause", "cause"),
-    ]
-    rows = [
-        [name_cell(name, results.controllers.index(name)), figure_cell(LOSSES, loss),
-         Cell(loss["cause"], loss["cause"])]
-        for name in order
-        for loss in results.summary["controllers"][name].get("losses", [])
-    ]  # fmt: skip
     caption = "Causes of lost trials, the most frequent one of each controller first."
-    return Table("losses", caption, columns, rows) if rows else None
+    columns = (CONTROLLER, LOSSES, Text("cause", "cause"))
+    return entry_table("losses", caption, columns, entries_of(results, order, "losses"))
 
 
-def smallest(results: Results, order: Sequence[str]) -> Table:
-    """The smallest pushes that each controller did not recover."""
-    columns = [
-        Column("controller", "controller"),
-        Column("trial", "trial", "its number in trials.csv"),
-        Column("limit_fraction", "push", "fraction of the limit"),
-        Column("impulse", "impulse [N·s]"),
-        Column("direction", "direction [°]", "counter-clockwise from forward"),
-        Column("duration", "duration [s]"),
-        Column("body", "body"),
-        Column("fall_time", "fell at [s]", "after the reset; none: stood, but not quiet"),
-        Column("why", "why"),
-    ]
-    rows = []
-    for name in order:
-        for record in smallest_lost(results, name)[:SMALLEST]:
-            body = record.line["body"]
-            rows.append([
-                name_cell(name, results.controllers.index(name)),
-                cell(record.trial, "d"),
-                _number_cell(record.fraction, ".2f"),
-                _number_cell(record.impulse, ".1f"),
-                _number_cell(record.direction, ".0f"),
-                _number_cell(record.duration, ".2f"),
-                Cell(body or None, body or "–"),
-                _number_cell(record.fall_time, ".2f"),
-                Cell(record.why or None, record.why or "–"),
-            ])  # fmt: skip
+def smallest(results: Results, order: Sequence[str]) -> Table | None:
+    """The smallest pushes that each controller did not recover; None where nothing was lost."""
     caption = f"The {SMALLEST} smallest pushes that each controller did not recover."
-    return Table("smallest_lost", caption, columns, rows).without_empty()
-
-
-def _number_cell(value: float, form: str) -> Cell:
-    return cell(value if math.isfinite(value) else None, form)
+    rows = [
+        {**vars(record), "body": record.line["body"]}
+        for name in order
+        for record in smallest_lost(results, name)[:SMALLEST]
+    ]
+    return entry_table("smallest_lost", caption, (CONTROLLER, *LOST), rows)

@@ -21,95 +21,101 @@ from poise.training.running.columns import (
     PERFORMED,
     STEPS,
     TRIED,
+    Entry,
     Figure,
 )
 from poise.training.running.summary import both_ends
-from poise.training.running.trial_figures import PhaseJ50
 
-from .cells import Cell, Column, Table, cell, figure_table
+from .cells import CONTROLLER, Cell, Table, Text, entries_of, entry_table
 from .plots import spans
 
 PARTS = {"walk": "walk", "gait": "steps", "velocity": "course", "walk_push": "pushed",
          "walk_kick": "kicked", "walk_repeated": "pushed again and again",
          "terrains": "terrain"}  # fmt: skip
+WALK = (CONTROLLER, Text("part", "part", "of the suite"),
+        Text("level", "level", "what it is told, or how it is pushed"))  # fmt: skip
+MOTION = Text("motion", "motion")
 
 
 def walk_table(results: Results, order: Sequence[str]) -> Table | None:
     """Every command of every controller: falls, and what was reached; None without walks."""
     caption = "What was reached of every command, pushed or not: means over trials."
-    return _walks(results, order, "walks", caption, (*FALLS, *STEPS[:2], *FOLLOWED))
+    columns = (*WALK, *FALLS, *STEPS[:2], *FOLLOWED)
+    return entry_table("walks", caption, columns, _walks(results, order))
 
 
 def cost_table(results: Results, order: Sequence[str]) -> Table | None:
     """The steps of every command of every controller, and what they cost; None without walks."""
     caption = "Steps and their cost, means over trials."
-    return _walks(results, order, "walk_costs", caption, (*STEPS[2:], *COSTS))
+    columns = (*WALK, *STEPS[2:], *COSTS)
+    return entry_table("walk_costs", caption, columns, _walks(results, order))
 
 
-def _walks(
-    results: Results, order: Sequence[str], name: str, caption: str, figures: Sequence[Figure]
-) -> Table | None:
-    """A row for each command."""
-    columns = [Column("part", "part", "of the suite"),
-               Column("level", "level", "what it is told, or how it is pushed")]  # fmt: skip
-    return figure_table(results, order, "walks", Table(name, caption, columns, []), figures,
-                        lambda e: [_words(PARTS.get(e["part"], e["part"])),
-                                   _words(e["level"])])  # fmt: skip
+def _walks(results: Results, order: Sequence[str]) -> list[Entry]:
+    """An entry for each command."""
+    return [
+        {**each, "part": PARTS.get(each["part"], each["part"]), "level": _words(each["level"])}
+        for each in entries_of(results, order, "walks")
+    ]
 
 
 def motion_table(results: Results, order: Sequence[str]) -> Table | None:
     """Every motion and share of every controller; None where no motion was performed."""
     caption = "Falls and errors of every motion, by the share of J50 that it was pushed by."
-    columns = [Column("motion", "motion"), Column("share", "push", "of the controller's J50")]
-    return figure_table(results, order, "motions", Table("motions", caption, columns, []),
-                        (*FALLS[:2], FELL, *PERFORMED),
-                        lambda e: [_words(e["motion"] or ALL), cell(e["share"], "g")])  # fmt: skip
-
-
-def level_table(results: Results, order: Sequence[str]) -> Table | None:
-    """Every level of realism of every controller; None where the suite has none."""
-    caption = "The same starts and pushes at each level of realism."
-    table = Table("levels", caption, [Column("level", "level", "of realism")], [])
-    return figure_table(results, order, "levels", table, AT_LEVEL, lambda e: [_words(e["level"])])
+    share = Figure("share", "push", "g", words="of the controller's J50")
+    columns = (CONTROLLER, MOTION, share, *FALLS[:2], FELL, *PERFORMED)
+    return entry_table("motions", caption, columns, _motions(results, order, "motions", ALL))
 
 
 def in_motion_table(results: Results, order: Sequence[str]) -> Table | None:
     """J50 in each motion of every controller; None where nothing was pushed in motion."""
     caption = "J50 in motion over that of standing, over all directions."
-    table = Table("in_motion", caption, [Column("motion", "motion")], [])
-    return figure_table(results, order, "in_motion", table, IN_MOTION,
-                        lambda e: [_words(e["motion"] or MEAN)])  # fmt: skip
+    columns = (CONTROLLER, MOTION, *IN_MOTION)
+    return entry_table("in_motion", caption, columns, _motions(results, order, "in_motion", MEAN))
+
+
+def _motions(results: Results, order: Sequence[str], key: str, every: str) -> list[Entry]:
+    """An entry for each motion; `every` is told of the one that is of all of them."""
+    return [
+        {**each, "motion": _words(each["motion"] or every)}
+        for each in entries_of(results, order, key)
+    ]
+
+
+def level_table(results: Results, order: Sequence[str]) -> Table | None:
+    """Every level of realism of every controller; None where the suite has none."""
+    caption = "The same starts and pushes at each level of realism."
+    columns = (CONTROLLER, Text("level", "level", "of realism"), *AT_LEVEL)
+    rows = [{**e, "level": _words(e["level"])} for e in entries_of(results, order, "levels")]
+    return entry_table("levels", caption, columns, rows)
 
 
 def phase_table(results: Results, order: Sequence[str]) -> Table | None:
     """J50 in each part of the stride; None where no walk was pushed."""
     caption = "J50 by the phase of the stride at which the push begins, over all directions."
-    columns = [Column("phase", "phase", "of the stride as the push begins: 0, the left foot lands")]
-    return figure_table(results, order, "phases", Table("phases", caption, columns, []),
-                        (*TRIED, J50), lambda e: [cell(e["phase"], ".3f")])  # fmt: skip
+    phase = Figure("phase", "phase", ".3f",
+                   words="of the stride as the push begins: 0, the left foot lands")  # fmt: skip
+    columns = (CONTROLLER, phase, *TRIED, J50)
+    return entry_table("phases", caption, columns, entries_of(results, order, "phases"))
 
 
 def phase_plot(results: Results, order: Sequence[str]) -> Markup | None:
     """J50 over the phase of the stride, with intervals; None where no walk was pushed."""
+    entries = results.summary["controllers"]
     found = [
         series(name, results.controllers.index(name), [
             (each["phase"], each["j50"], *(both_ends(each["j50_ci95"]) or (np.nan, np.nan)),
              SIDES[each["j50_bound"]])
             for each in phases
         ])
-        for name, phases in _phases(results, order).items()
+        for name in order
+        if (phases := entries[name].get("phases"))
     ]  # fmt: skip
     if not found:
         return None
     out = Inline(spans("J50 [N·s] over the phase of the stride", found, ".1f"))
     phase_curves(out, found)
     return out.svg
-
-
-def _phases(results: Results, order: Sequence[str]) -> dict[str, Sequence[PhaseJ50]]:
-    """controller → what is known of its phases, of those that were pushed on a walk."""
-    found = {name: results.summary["controllers"][name].get("phases", ()) for name in order}
-    return {name: phases for name, phases in found.items() if phases}
 
 
 def _words(text: str) -> Cell:

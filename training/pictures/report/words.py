@@ -46,11 +46,6 @@ def push_text(record: Record, trial: Trial) -> str:
     )
 
 
-def push_times(trial: Trial) -> list[tuple[float, float]]:
-    """(start, duration) of every push of a trial [s]."""
-    return [(push.start, push.duration) for push in trial.pushes]
-
-
 def _world(trial: Trial) -> list[str]:
     """Return how the conditions of a trial differ from the standard ones."""
     said, conditions = [], trial.conditions

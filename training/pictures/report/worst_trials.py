@@ -3,6 +3,7 @@
 import io
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,20 +103,15 @@ def film(results: Results, record: Record, times: Sequence[float], draw: bool = 
         ConfigError: the controller or the robot is no longer what was evaluated.
         PoiseError: nothing can be drawn here.
     """
-    signals = Signals()
-    camera = _FrameTaker(times, record.direction) if draw else None
+    signals, camera = Signals(), _FrameTaker(times if draw else (), record.direction)
 
     def watch(env: BalanceEnv) -> None:
         signals(env)
-        if camera is not None:
-            camera(env)
+        camera(env)
 
-    try:
+    with closing(camera):
         again = replay(results, record.trial, record.controller, watch=watch)
-    finally:
-        if camera is not None:
-            camera.close()
-    return Film(record, signals, camera.frames if camera else (), not again.differences)
+    return Film(record, signals, camera.frames, not again.differences)
 
 
 def frame_times(record: Record) -> list[float]:
@@ -143,7 +139,8 @@ class _FrameTaker:
 
     def __init__(self, times: Sequence[float], direction: float):
         self.camera = beside(direction, CAMERA) if math.isfinite(direction) else CAMERA
-        self.times, self.frames = list(times), []  # type: tuple[list[float], list[tuple[float, bytes]]]
+        self.times = list(times)
+        self.frames: list[tuple[float, bytes]] = []
         self._renderer: SceneRenderer | None = None
 
     def __call__(self, env: BalanceEnv) -> None:

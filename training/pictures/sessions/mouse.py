@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.overlays import ARROW, Mark
@@ -60,7 +60,7 @@ def pull(
     `ray` is where the camera is (3,) and a point (3,) under the mouse, at any distance. The arrow
     ends where the ray meets the horizontal plane through the grabbed point.
     """
-    rotation = _matrix(frame.quaternions[body])
+    rotation = Rotation.from_quat(frame.quaternions[body], scalar_first=True).as_matrix()
     point = grabbed_point(robot, body, frame.positions[body], rotation, grabbed)
     arrow = _to_plane(*ray, grabbed[2]) - grabbed
     arrow[2] = 0.0
@@ -86,9 +86,3 @@ def _to_plane(eye: np.ndarray, through: np.ndarray, height: float) -> np.ndarray
     ray = ray / max(float(np.linalg.norm(ray)), 1e-9)
     distance = (height - eye[2]) / ray[2] if abs(ray[2]) > FLAT else -1.0
     return eye + distance * ray if distance > 0.0 else np.array(through, dtype=float)
-
-
-def _matrix(quaternion: np.ndarray) -> np.ndarray:
-    flat = np.empty(9)
-    mujoco.mju_quat2Mat(flat, quaternion)
-    return flat.reshape(3, 3)

@@ -1,16 +1,22 @@
-"""What is to be shown, in text: the command and the link that show the same again."""
+"""What is to be shown, in text: the command and the link that show the same again, and the names
+that may stand in a link."""
 
 import shlex
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 from urllib.parse import parse_qs, urlencode
 
 from poise.baselines.allowance import named
+from poise.baselines.policy_files.known import RIVALS
 from poise.configs.errors import ConfigError, shown
+from poise.configs.files import packaged
 from poise.envs.sensing.realism import IDEAL
+from poise.training.benchmarking.trials.names import NO_CONTROL
 
 STANDING = "standing"  # the motion of a session that names none
 MOST = 3  # controllers side by side
+NOBODY = "none"  # in the place of a controller
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,39 @@ class TrialSpec:
 
 
 Spec = SessionSpec | TrialSpec
+
+
+class Choices(NamedTuple):
+    """The names of each kind that can be chosen on the page, or by a link.
+
+    Nothing that is a path or code, but for what the user has named on the command line.
+    """
+
+    robots: tuple[str, ...]
+    controllers: tuple[str, ...]
+    motions: tuple[str, ...]
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """Names of any kind."""
+        return (*self.robots, *self.controllers, *self.motions)
+
+
+def choices(named: Spec) -> Choices:
+    """What is packaged, no control at all, and what the user has named."""
+    players = (*packaged("controllers"), *packaged("policies"), *packaged(RIVALS), NO_CONTROL)
+    robots, motions = tuple(packaged("robots")), tuple(packaged("motions"))
+    if not isinstance(named, SessionSpec):
+        return Choices(robots, players, motions)
+    return Choices(
+        _with(robots, named.robot),
+        _with(players, *named.controllers),
+        _with(motions, named.motion),
+    )
+
+
+def _with(names: tuple[str, ...], *more: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*names, *more)))
 
 
 def read_link(query: str, now: Spec, names: Collection[str]) -> Spec | None:

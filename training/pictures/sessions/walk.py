@@ -1,6 +1,5 @@
 """One walk: played, told in lines while it goes on, filmed, and its figures in words."""
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -14,9 +13,7 @@ from poise.baselines.walking.walk import allocate_gait, limits_of_legs
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.physics.pushes.options import parse_pushes
 from poise.envs.physics.pushes.push import Push
-from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
 from poise.envs.terrain.bumps import Bumps
@@ -31,7 +28,6 @@ from poise.training.pictures.figures.video import record
 from .loading import read_pushes
 
 EVERY = 5.0  # [s] between lines about a walk
-PUSH = re.compile(r"(?P<impulse>[^@]+)@(?P<direction>[^@]+)")
 Say = Callable[[str], object]  # prints a line
 
 
@@ -121,21 +117,17 @@ def parse_push(text: str, start: float, duration: float, robot: Robot) -> Push:
     """
     if text.lstrip().startswith("{"):
         return read_pushes(text, robot)[0]
-    found = PUSH.fullmatch(text.strip())
     try:
-        numbers = {name: float(value) for name, value in found.groupdict().items()} if found else {}
+        numbers = [float(part) for part in text.split("@")]
     except ValueError:
-        numbers = {}
-    if not numbers:
+        numbers = []
+    if len(numbers) != 2:
         raise ConfigError(f"must be an impulse and a direction such as 20@90, not {shown(text)}",
                           field="push")  # fmt: skip
     if not 0.0 <= start < duration:
         raise ConfigError(f"must be within the {duration:g} s of the walk, not {start:g}",
                           field="push_at")  # fmt: skip
-    fields = {**numbers, "start": start, "body": push_bodies(robot)[0]}
-    (push,) = parse_pushes(fields, robot)
-    assert isinstance(push, Push)  # a kick has no impulse
-    return push
+    return read_pushes(f"{text}@{start}", robot)[0]
 
 
 class Told:

@@ -4,17 +4,17 @@ import queue
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import viser
 
 from poise.configs.errors import PoiseError
 from poise.envs.viewing.quantities import Quantity
-from poise.training.pictures.sessions.choices import choices
 from poise.training.pictures.sessions.frames import between
 from poise.training.pictures.sessions.live import Frames, Play
 from poise.training.pictures.sessions.mouse import Pull
 from poise.training.pictures.sessions.pace import Pace
-from poise.training.pictures.sessions.spec import SessionSpec, Spec, TrialSpec, read_link
+from poise.training.pictures.sessions.spec import SessionSpec, Spec, TrialSpec, choices, read_link
 
 from .pages import Pages, send_films, send_picture
 from .panel import OPACITY, Panel, Wishes, status
@@ -70,7 +70,8 @@ class BrowserView:
     def _set_play(self, play: Play) -> None:
         """Show this."""
         self.play = play
-        self.stage = Stage(self._server, play.robot, play.names, self._grabbed, self._opacity)
+        grabbed = partial(self.ask, self._pulled)
+        self.stage = Stage(self._server, play.robot, play.names, grabbed, self._opacity)
         self._pages.point_cameras()
         self.stage.marks.hidden, self.stage.following = self._hidden, self._following
         with self._tab:
@@ -209,7 +210,8 @@ class BrowserView:
             self._told = now
             history = self.play.history
             at, first, last = (history[k][0].time for k in (self.play.at, 0, -1))
-            text = status(self.play, self.paused, self.pace, self._pulled_now())
+            pulled = None if self.stage.pull is None else self._push_of(self.stage.pull)
+            text = status(self.play, self.paused, self.pace, pulled)
             self.panel.tell(text, self.paused, at, first, last)
             waits = self._sliders.waiting is not None
             self.panel.tell_how(self.play.spec, None if waits else self.play.gait)
@@ -240,23 +242,15 @@ class BrowserView:
         if self.paused:
             self.pace.rest()
 
-    def _grabbed(self, phase: str, pulled: Pull) -> None:
-        """In the server's thread, while a body is dragged."""
-        self.ask(self._pulled, phase, pulled)
-
-    def _pulled_now(self) -> dict[str, object] | None:
-        """The push that the arrow of the mouse would be now."""
-        if self.stage.pull is None:
-            return None
-        duration = float(self.panel.duration.value)
-        return self.stage.pull.fields(self.play.robot, self.play.yaw, duration)
-
     def _pulled(self, phase: str, pulled: Pull) -> None:
-        if phase != "end":
-            self.stage.pull = pulled
-            return
-        self.stage.pull = None
-        self.push(pulled.fields(self.play.robot, self.play.yaw, float(self.panel.duration.value)))
+        """A body is dragged, or let go of."""
+        self.stage.pull = None if phase == "end" else pulled
+        if phase == "end":
+            self.push(self._push_of(pulled))
+
+    def _push_of(self, pulled: Pull) -> dict[str, object]:
+        """The push that the arrow of the mouse is."""
+        return pulled.fields(self.play.robot, self.play.yaw, float(self.panel.duration.value))
 
     def show(self, quantity: Quantity, shown: bool) -> None:
         """Show the marks of a quantity, or hide them."""

@@ -1,36 +1,17 @@
 """The marks of `envs/viewing/overlays.py` in viser's scene."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 
+import mujoco
 import numpy as np
 import trimesh
 import viser
 
-from poise.envs.viewing.overlays import ARROW, BAR, DISC, SPHERE, Mark
-from poise.envs.viewing.quantities import (
-    CAPTURE_POINT,
-    COM,
-    CONTACT_FORCE,
-    COP,
-    FOOTHOLD,
-    PUSH,
-    REFERENCE,
-    SUPPORT,
-    Quantity,
-)
+from poise.envs.viewing.overlays import ARROW, SPHERE, Mark
+from poise.envs.viewing.quantities import Quantity
+from poise.training.pictures.figures.palette import linear_rgb
 
-#: quantity → names of its marks
-SHOWN: dict[Quantity, tuple[str, ...]] = {
-    PUSH: ("push",),
-    COM: ("com", "com on ground"),
-    COP: ("cop",),
-    CAPTURE_POINT: ("capture point",),
-    SUPPORT: ("support",),
-    CONTACT_FORCE: ("contact force",),
-    FOOTHOLD: ("foothold",),
-    REFERENCE: (),  # a robot, not a mark
-}
 ROOM = {"spheres": 2, "cylinders": 32, "heads": 10}  # mesh → instances for each robot
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0], np.float32)
 HEAD = 0.3  # of an arrow's length, at most
@@ -87,11 +68,11 @@ class Marks:
 
     def show(self, found: Iterable[tuple[Mark, np.ndarray]]) -> None:
         """Show marks, each moved by an offset (3,) [m]."""
-        left_out = {name for quantity in self.hidden for name in SHOWN[quantity]}
+        left_out = {quantity.colour for quantity in self.hidden}
         placed: dict[str, list[Placed]] = {name: [] for name in self.sets}
         for mark, offset in found:
-            if mark.name not in left_out:
-                for name, start, end, scale in PARTS[mark.shape](mark):
+            if mark.colour not in left_out:
+                for name, start, end, scale in _parts(mark):
                     placed[name].append((start + offset, end + offset, scale, mark))
         for name, each in self.sets.items():
             each.show(placed[name])
@@ -100,20 +81,15 @@ class Marks:
 Part = tuple[str, np.ndarray, np.ndarray, np.ndarray]  # mesh, start, end, scale
 
 
-def _sphere(mark: Mark) -> list[Part]:
-    return [("spheres", mark.start, mark.start, np.full(3, mark.radius))]
-
-
-def _rod(mark: Mark) -> list[Part]:
-    up = np.array([0.0, 0.0, LIFT])
-    length = np.linalg.norm(mark.end - mark.start)
-    scale = np.array([mark.radius, mark.radius, length])
-    return [("cylinders", mark.start + up, mark.end + up, scale)]
-
-
-def _arrow(mark: Mark) -> list[Part]:
-    """Shaft and head; the tip is the mark's end."""
+def _parts(mark: Mark) -> list[Part]:
+    """What a mark is made of; an arrow of a shaft and a head, its tip is the mark's end."""
+    if mark.shape == SPHERE:
+        return [("spheres", mark.start, mark.start, np.full(3, mark.radius))]
     length = float(np.linalg.norm(mark.end - mark.start))
+    if mark.shape != ARROW:
+        up = np.array([0.0, 0.0, LIFT])
+        scale = np.array([mark.radius, mark.radius, length])
+        return [("cylinders", mark.start + up, mark.end + up, scale)]
     if length < 1e-6:
         return []
     width = mark.radius * HEAD_WIDTH
@@ -123,26 +99,15 @@ def _arrow(mark: Mark) -> list[Part]:
     return [("cylinders", mark.start, neck, shaft), ("heads", neck, mark.end, cone)]
 
 
-PARTS: dict[object, Callable[[Mark], list[Part]]] = {
-    SPHERE: _sphere, DISC: _rod, BAR: _rod, ARROW: _arrow
-}  # fmt: skip
-
-
 @cache
 def linear(colour: tuple[float, ...]) -> np.ndarray:
     """A colour (3,) of 0 to 1 as viser's instances take it: uint8 in linear RGB, not in sRGB."""
-    c = np.asarray(colour, dtype=float)
-    light = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-    return np.rint(255.0 * light).astype(np.uint8)
+    return np.rint(255.0 * linear_rgb(colour)).astype(np.uint8)
 
 
 def _along(vector: np.ndarray) -> np.ndarray:
     """A quaternion (4,), w first, that turns the z axis towards `vector` (3,)."""
-    length = float(np.linalg.norm(vector))
-    if length < 1e-9:
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    x, y, z = vector / length
-    if z < -1.0 + 1e-9:
-        return np.array([0.0, 1.0, 0.0, 0.0])
-    quaternion = np.array([1.0 + z, -y, x, 0.0])
-    return quaternion / np.linalg.norm(quaternion)
+    quaternion = NO_TURN.astype(float)
+    if vector.any():
+        mujoco.mju_quatZ2Vec(quaternion, vector)
+    return quaternion

@@ -2,7 +2,6 @@
 
 import queue
 import time
-from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -26,13 +25,10 @@ WAIT = 0.02  # [s] between two pictures while it is paused
 
 
 class NativeView:
-    """Plays a session of one controller in MuJoCo's window until that is closed.
+    """Plays a session of one controller in MuJoCo's window until that is closed."""
 
-    `say` is given what cannot be done, line by line.
-    """
-
-    def __init__(self, live: Live, say: Callable[[str], object] = print):
-        self.live, self.paused, self.pace, self._say = live, False, Pace(), say
+    def __init__(self, live: Live):
+        self.live, self.paused, self.pace = live, False, Pace()
         self._keys = queue.SimpleQueue[int]()  # pressed, in the window's thread
         simulation = live.session.sides[0].env.simulation
         self.renderer = SceneRenderer(simulation, human=True, keys=self._keys.put)
@@ -83,7 +79,7 @@ class NativeView:
         try:
             self.live.push(**fields)
         except PoiseError as error:
-            self._say(str(error))
+            print(error)
 
     def _pulled(self, viewer: Viewer) -> Pull | None:
         """The body that MuJoCo's window drags, if it is one of the robot's."""
@@ -98,17 +94,17 @@ class NativeView:
         return Pull(body, point, start, arrow)
 
 
-def run_native(live: Live, seconds: float | None, say: Callable[[str], object]) -> float:
+def run_native(live: Live, seconds: float | None) -> float:
     """Show a session of one controller; returns the real-time factor reached.
 
     Raises PoiseError without a display.
     """
-    view = NativeView(live, say)
-    say(HELP)
+    view = NativeView(live)
+    print(HELP)
     try:
         with until_ctrl_c():
             view.run(seconds)
     finally:
         view.renderer.close()
-    say(f"{view.pace.total:.3f} × real time over {view.pace.wanted:.1f} s")
+    print(f"{view.pace.total:.3f} × real time over {view.pace.wanted:.1f} s")
     return view.pace.total

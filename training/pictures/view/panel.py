@@ -11,14 +11,12 @@ import viser
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.texts import code, plain
 from poise.envs.physics.pushes.options import body_names
-from poise.envs.viewing.quantities import Quantity
-from poise.training.pictures.sessions.choices import NOBODY, Choices
+from poise.envs.viewing.quantities import QUANTITIES, Quantity
 from poise.training.pictures.sessions.live import Play
 from poise.training.pictures.sessions.mouse import DURATION, WEIGHT
 from poise.training.pictures.sessions.pace import Pace
-from poise.training.pictures.sessions.spec import MOST, Spec, TrialSpec
+from poise.training.pictures.sessions.spec import MOST, NOBODY, Choices, Spec, TrialSpec
 
-from .marks import SHOWN
 from .walking import WalkSliders
 
 SPEEDS = {"1×": 1.0, "1/2×": 0.5, "1/4×": 0.25, "1/10×": 0.1}  # label → simulated over real time
@@ -138,7 +136,7 @@ class Panel:
         buttons = gui.add_button_group("Time", ("Step", "Reset"))
         buttons.on_click(self._asked(self._step_or_reset))
         speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
-        speed.on_update(self._asked(lambda e: self.wishes.speed(SPEEDS[_of(e, SPEEDS)])))
+        speed.on_update(self._asked(lambda e: self.wishes.speed(SPEEDS.get(e.target.value, 1.0))))
         self.timeline: Any = gui.add_slider("Time [s]", 0.0, 0.02, 0.02, 0.0)
         self.timeline.on_update(self._asked(self._seek, users=True))
 
@@ -195,7 +193,7 @@ class Panel:
 
     def _showing(self, dark: bool) -> None:
         gui, wishes = self._gui, self.wishes
-        for quantity in SHOWN:
+        for quantity in QUANTITIES:
             box = gui.add_checkbox(quantity.label, True)
             box.on_update(self._asked(partial(self._show, quantity)))
         opacity = gui.add_slider("Robot's opacity", 0.1, 1.0, 0.05, OPACITY)
@@ -248,8 +246,3 @@ def status(play: Play, paused: bool, pace: Pace, pulled: Mapping[str, object] | 
     if pulled is not None:
         lines.append(f"**{pulled['impulse']} N·s** towards {pulled['direction']}°")
     return "  \n".join(lines)
-
-
-def _of(event: Any, options: dict[str, float]) -> str:
-    """The chosen option; the first one for what no page of ours sends."""
-    return event.target.value if event.target.value in options else next(iter(options))

@@ -79,11 +79,6 @@ class Robots:
         for mesh in self.meshes:
             mesh.handle.visible = visible
 
-    def remove(self) -> None:
-        """Take the robots out of the scene."""
-        for mesh in self.meshes:
-            mesh.handle.remove()
-
     def _add(self, name: str, geoms: list[int]) -> Mesh:
         mesh = merge_geoms(self.model, geoms)
         wxyzs, positions = self._still

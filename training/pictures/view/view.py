@@ -12,11 +12,9 @@ from poise.training.pictures.sessions.loading import load_live
 from poise.training.pictures.sessions.recorded import recorded_trial
 from poise.training.pictures.sessions.spec import MOST, STANDING, SessionSpec, Spec, TrialSpec
 
-from .origins import Visits
-from .server import check_installed, check_port, greeting, serving, until_ctrl_c
+from .server import Visits, check_installed, check_port, greeting, serving, until_ctrl_c
 
 DEFAULT = "feedback-step"
-Say = Callable[[str], object]
 
 
 @allows("controllers")
@@ -35,7 +33,6 @@ def view(
     seconds: float | None = None,
     dark: bool = False,
     allow: str | Iterable[str] = (),
-    say: Say = print,
 ) -> float:
     """Show controllers side by side, which the user pushes; returns the real-time factor reached.
 
@@ -52,7 +49,6 @@ def view(
         seconds: of the wall clock after which it ends; None: when the process is stopped.
         dark: whether the page is dark.
         allow: controllers from outside that may run though only a file names them.
-        say: is given what is to be told, line by line.
 
     Raises:
         ConfigError: anything named does not exist or is not valid; nothing has been loaded then.
@@ -64,12 +60,12 @@ def view(
     if not native:
         check_port(host, port)
         check_installed()
-    live = load_live(spec, say)
+    live = load_live(spec, print)
     if native:
         from .native import run_native
 
-        return run_native(live, seconds, say)
-    return _serve(live, _load_session, host, port, seconds, dark, say)
+        return run_native(live, seconds)
+    return _serve(live, _load_session, host, port, seconds, dark)
 
 
 def view_trial(
@@ -82,7 +78,6 @@ def view_trial(
     seconds: float | None = None,
     dark: bool = False,
     allow: str | Iterable[str] = (),
-    say: Say = print,
 ) -> float:
     """Show a trial of a result, with a timeline; returns the real-time factor reached.
 
@@ -90,7 +85,7 @@ def view_trial(
         folder: written by `evaluate` or `benchmark`.
         trial: its number in trials.csv.
         controllers: up to three of those that took part; none: the last one.
-        host, port, seconds, dark, allow, say: as of `view`.
+        host, port, seconds, dark, allow: as of `view`.
 
     Raises:
         ConfigError, PoiseError: as `view` and `replay`.
@@ -103,11 +98,11 @@ def view_trial(
         assert isinstance(spec, TrialSpec)
         play, lines = recorded_trial(Path(folder), spec.trial, spec.controllers, allow)
         for line in lines:
-            say(line)
+            print(line)
         return play
 
     play = load(TrialSpec(str(folder), trial, tuple(controllers)))
-    return _serve(play, load, host, port, seconds, dark, say)
+    return _serve(play, load, host, port, seconds, dark)
 
 
 def _check(spec: SessionSpec, seconds: float | None, native: bool) -> None:
@@ -132,7 +127,7 @@ def _load_session(spec: Spec) -> Play:
 
 def _serve(
     play: Play, load: Callable[[Spec], Play], host: str, port: int,
-    seconds: float | None, dark: bool, say: Say,
+    seconds: float | None, dark: bool,
 ) -> float:  # fmt: skip
     from .browser import BrowserView
 
@@ -142,10 +137,10 @@ def _serve(
         visits.opened = browser.visited
         link = play.spec.link if isinstance(play.spec, TrialSpec) else ""
         for line in greeting(host, server.get_port(), link):
-            say(line)
+            print(line)
         with until_ctrl_c():
             if seconds is None:
-                say("Ctrl-C ends it")
+                print("Ctrl-C ends it")
             browser.run(seconds)
-        say(f"{browser.pace.total:.3f} × real time over {browser.pace.wanted:.1f} s")
+        print(f"{browser.pace.total:.3f} × real time over {browser.pace.wanted:.1f} s")
         return browser.pace.total

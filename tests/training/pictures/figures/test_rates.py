@@ -95,7 +95,7 @@ def test_falls_have_bins_intervals_and_curves() -> None:
     x, out = np.linspace(0.1, 1.0, 40), Inline()
     trials = {"a": (x, x < 0.5), "b": (x, x < 0.05)}
     fits = {name: fit_logistic(*pair) for name, pair in trials.items()}
-    fall_probability(out, trials, fits, unit="fraction", bins=4)
+    fall_probability(out, trials, fits, bins=4)
     lines = {group.get("data-series"): points(group[0]) for group in groups(out)
              if group[0].get("fill") == "none" and group[0].get("stroke-width") == "2"}  # fmt: skip
     assert set(lines) == {"0"} and lines["0"][0, 1] > lines["0"][-1, 1]

@@ -9,23 +9,23 @@ import io
 
 from poise.training.pictures.report.cells import (
     Cell,
-    Column,
     Table,
+    Text,
     cell,
     download,
-    name_cell,
     number_text,
     p_cell,
 )
+from poise.training.running.columns import Figure
 
-COLUMNS = [Column("name", "Name"), Column("x", "X [m]", interval=True), Column("none", "None")]
+COLUMNS = [Text("name", "Name"), Figure("x", "X", ".1f", "m", ends="x_ci95"), Text("none", "None")]
 TABLE = Table(
     "some",
     "A caption.",
     COLUMNS,
     [
-        [name_cell("a, b", 0), cell(1 / 3, ".1f", (-0.25, 0.5)), cell(None)],
-        [name_cell("ü", 1), cell(None), cell(None)],
+        [Cell("a, b", "a, b", head=True), cell(1 / 3, ".1f", (-0.25, 0.5)), cell(None)],
+        [Cell("ü", "ü", head=True), cell(None), cell(None)],
     ],
 )
 

@@ -8,8 +8,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.training.pictures.sessions.choices import choices
-from poise.training.pictures.sessions.spec import SessionSpec, TrialSpec, read_link
+from poise.training.pictures.sessions.spec import SessionSpec, TrialSpec, choices, read_link
 
 PUSH = "{impulse: 12.0, direction: -70.0, body: torso, start: 0.02, point: [0.1, 0.0, -0.25]}"
 FULL = SessionSpec(
