@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -45,7 +45,7 @@ from .mdp.docstrings import filled
 from .mdp.observation import Term, Terms, View, frames, mirror_terms, observer, scales
 from .mdp.reward import REWARD_TERMS, RewardView, rewards
 from .mdp.termination import episode_limits
-from .mdp.terms import TERMS, MeasuredView
+from .mdp.terms import TERMS
 from .servos import holding_torques
 from .start import RESET_OPTIONS, chosen_pushes, chosen_start, reset_options
 
@@ -174,15 +174,16 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     def _view(self, kind: type[Block], out: np.ndarray) -> Block:
         """The block of a term that fills `out`, of the `kind` that its kernel works on."""
+        source, block = self.state_source, cast(Any, kind)
+        seen = self._view_of(source.arrays, source.state_arrays, out)
+        return seen if kind is View else block(seen, *self._readings(kind))
+
+    def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        """The members of a block of this `kind` besides its `View`: here of a `MeasuredView`."""
         source = self.state_source
-        view = self._view_of(source.arrays, source.state_arrays, out)
-        if kind is not MeasuredView:
-            return view
         if isinstance(source, EstimatedState):
-            return MeasuredView(view, source.sensors.rings, source.belief.steps, False)
-        return MeasuredView(
-            view, Rings.allocate(self.simulation.sizes), guarded_zeros(1, int), True
-        )
+            return source.sensors.rings, source.belief.steps, False
+        return Rings.allocate(self.simulation.sizes), guarded_zeros(1, int), True
 
     def _true_view(self, kind: type[Block], out: np.ndarray) -> Block:
         """The block of a term that fills `out` from the true robot's state."""
