@@ -52,11 +52,13 @@ class ControlledEnv(CommandedEnv):
 
     @controller.setter
     def controller(self, controller: Controller) -> None:
-        self._accept(as_base_controller(controller, self.robot))
-        self._controller = controller
+        self._accept(controller, as_base_controller(controller, self.robot))
 
-    def _accept(self, base: BaseController) -> None:
-        """Take the controller; raises ConfigError for one that this environment cannot play."""
+    def _accept(self, controller: Controller, base: BaseController) -> None:
+        """Take the controller; raises ConfigError for one that this environment cannot play.
+
+        `base` is the controller itself, or a wrapper of one that is no `BaseController`.
+        """
         made_for = base.robot
         if made_for.fingerprint != self.robot.fingerprint:  # compiled code trusts array sizes
             raise ConfigError(
@@ -66,7 +68,7 @@ class ControlledEnv(CommandedEnv):
         step, source = self.arrays.timestep, "environment"
         self.control_substeps = whole_steps(period, step, "controller period", source)
         self.ticks = whole_steps(self.config.policy_period, period, "policy_period", source)
-        self._base = base
+        self._controller, self._base = controller, base
         self._take_walker(base)
         # all others are called from Python, tick by tick
         self._compiled = isinstance(base, CompiledController) and base.compiled

@@ -68,11 +68,11 @@ class ResidualStepEnv(ResidualBalanceEnv):
         self._step_report = guarded_zeros(REPORTED)
         super().__init__(robot, config, controller=controller, **arguments)
 
-    def _accept(self, base: BaseController) -> None:
+    def _accept(self, controller: Controller, base: BaseController) -> None:
         stepper = base.unwrapped
         if not isinstance(stepper, SteppingController):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
-        super()._accept(base)
+        super()._accept(controller, base)
         self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
         self._offsets = stepper.offsets.values  # one array is both
         self._residual = replace(self._residual, offsets=self._offsets)

@@ -79,14 +79,14 @@ class ResidualWalkEnv(ResidualStepEnv):
         self._strides = Strides.allocate()
         super().__init__(robot, config, controller=controller, **arguments)
 
-    def _accept(self, base: BaseController) -> None:
+    def _accept(self, controller: Controller, base: BaseController) -> None:
         walker = base.unwrapped
         if not isinstance(walker, WalkingController):
             choices = walking_controllers(planners=True)
             raise ConfigError("does not walk", field="controller", choices=choices)
         for command in self.command_sampler.extremes():
             check_reach(walker, command)
-        super()._accept(base)
+        super()._accept(controller, base)
         self.walker = walker  #: the controller that walks, of which `controller` may be a wrapper
 
     def arguments(self) -> dict[str, Any]:

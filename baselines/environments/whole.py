@@ -90,8 +90,8 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         super().__init__(robot, config, controller=controller, **arguments)
         self.servos = make_servos(self.robot, self.servo_config)
 
-    def _accept(self, base: BaseController) -> None:
-        super()._accept(base)
+    def _accept(self, controller: Controller, base: BaseController) -> None:
+        super()._accept(controller, base)
         if not self._compiled or not isinstance(base, CompiledController):
             raise ConfigError("has no compiled tick, from which servos could take over",
                               field="controller")  # fmt: skip
