@@ -2,8 +2,9 @@
 
 import inspect
 from dataclasses import dataclass, field, fields
+from functools import partial
 from operator import attrgetter, is_not
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,23 +19,28 @@ from poise.envs.robots.robot import Robot
 COMMAND_ENTRIES = 8  # of `BaseController.orders`
 
 
-class ServoOutputs(NamedTuple):
-    """Servos that give the torques: τ = K (q* − q) − D q̇ of each joint, within the limits."""
-
-    target: np.ndarray  # (nj,) q* [rad]
-    stiffness: np.ndarray  # (nj,) K [N·m/rad]
-    damping: np.ndarray  # (nj,) D [N·m·s/rad]
+no_numbers = partial(guarded_zeros, 0)
 
 
-class Outputs(NamedTuple):
-    """The arrays in which compiled code finds what a controller's tick gave."""
+@dataclass(frozen=True, eq=False)
+class Outputs(Block):
+    """The arrays in which compiled code finds what a controller's tick gave.
+
+    Where servos give the torques, τ = K (q* − q) − D q̇ of each joint within the limits, motors that
+    are real run them themselves.
+    """
 
     tau: np.ndarray  # (nv−6,) joint torques [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
     soft_root: bool
-    vdot: np.ndarray | None = None  # (nv,) accelerations that the torques are to bring, if known
-    servos: ServoOutputs | None = None  # which motors run themselves where they are real
+    # (nv,) accelerations that the torques are to bring; (0,): not known
+    vdot: np.ndarray = field(default_factory=no_numbers)
+    target: np.ndarray = field(
+        default_factory=no_numbers
+    )  # (nj,) q* of the servos [rad]; (0,): none
+    stiffness: np.ndarray = field(default_factory=no_numbers)  # (nj,) K [N·m/rad]
+    damping: np.ndarray = field(default_factory=no_numbers)  # (nj,) D [N·m·s/rad]
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,8 @@ if TYPE_CHECKING:
     from poise.envs.physics.state import RobotState
     from poise.envs.physics.state_source import StateSource
     from poise.envs.robots.robot import Robot, load_robot, on_terrain
-    from poise.envs.sensing.estimator import EstimatedState, EstimatorConfig
+    from poise.envs.sensing.config import EstimatorConfig
+    from poise.envs.sensing.estimator import EstimatedState
     from poise.envs.sensing.realism import Realism
     from poise.envs.terrain.terrain import Terrain, make_terrain
     from poise.envs.viewing.camera import Camera

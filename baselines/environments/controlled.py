@@ -7,26 +7,23 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.controller import (
+    BaseController,
     CompiledController,
     Controller,
-    ServoOutputs,
     Targets,
     as_base_controller,
 )
 from poise.baselines.walking.schedule import follow_timetable
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_steps
-from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
+from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, Program, address_of
-from poise.envs.compiled.memory import guarded_zeros
 
 from .commanded import CommandedEnv
 from .policy_step import (
     PolicyStep,
     TargetInputs,
-    TickAccount,
-    account_tick,
     add_torques,
     policy_tick,
     set_offsets,
@@ -55,7 +52,13 @@ class ControlledEnv(CommandedEnv):
 
     @controller.setter
     def controller(self, controller: Controller) -> None:
-        base = as_base_controller(controller, self.robot)
+        self._accept(controller, as_base_controller(controller, self.robot))
+
+    def _accept(self, controller: Controller, base: BaseController) -> None:
+        """Take the controller; raises ConfigError for one that this environment cannot play.
+
+        `base` is the controller itself, or a wrapper of one that is no `BaseController`.
+        """
         made_for = base.robot
         if made_for.fingerprint != self.robot.fingerprint:  # compiled code trusts array sizes
             raise ConfigError(
@@ -68,7 +71,7 @@ class ControlledEnv(CommandedEnv):
         self._controller, self._base = controller, base
         self._take_walker(base)
         # all others are called from Python, tick by tick
-        self._compiled = isinstance(controller, CompiledController) and controller.compiled
+        self._compiled = isinstance(base, CompiledController) and base.compiled
         self._com_offset = float(base.com_offset)
         self.believe_raw(base.raw_measurements)
         self._unbind()
@@ -77,7 +80,6 @@ class ControlledEnv(CommandedEnv):
         super()._unbind()
         self._bound: tuple[PolicyStep, Block]  # what `_step` works on, the gains when it was made
         self._inputs: TargetInputs | None = None
-        self._accounts: TickAccount | None = None
 
     def _target_inputs(self) -> TargetInputs:
         """The block for `set_targets`; the same object until something is replaced."""
@@ -107,21 +109,12 @@ class ControlledEnv(CommandedEnv):
         """All that a policy step works on, with the controller's `kernel` and its block `tick`."""
         controller = self._controller
         assert isinstance(controller, CompiledController)  # only they have ticks
-        found = controller.outputs()
-        servos = found.servos or ServoOutputs(*(guarded_zeros(0) for _ in range(3)))
         return PolicyStep(
             inputs=self._target_inputs(),
             kernel=kernel,
             tick=Erased(tick),
-            tau=found.tau,
-            root_wrench=found.root_wrench,
-            failures=found.failures,
-            soft_root=found.soft_root,
-            vdot=guarded_zeros(0) if found.vdot is None else found.vdot,
+            outputs=controller.outputs(),
             promise=self.state_source.promise,
-            target=servos.target,
-            stiffness=servos.stiffness,
-            damping=servos.damping,
             world=self.simulation.world(),
             estimate=self.state_source.estimate,
             ticks=self.ticks,
@@ -171,7 +164,7 @@ class ControlledEnv(CommandedEnv):
         sim.bus.servoed[0] = 0
         wrench[:] = self._base.root_wrench
         self._push_root(wrench)
-        account_tick(self._account())
+        record_tick(sim.arrays, sim.state_arrays.qvel, ctrl, float(self.controller.period), e)
         sim.step(ctrl, self.control_substeps)
         source.update()
         e.ticks[0] += 1
@@ -183,13 +176,6 @@ class ControlledEnv(CommandedEnv):
         if self._orders is not None:
             follow_timetable(self._follower(self._orders))
         self._observe()
-
-    def _account(self) -> TickAccount:
-        """The block of `account_tick`; the same object until the world is another."""
-        world = self.simulation.world()
-        if self._accounts is None or self._accounts.world is not world:
-            self._accounts = TickAccount(world, self.controller.period, self.episode)
-        return self._accounts
 
     def _push_root(self, wrench: np.ndarray) -> None:
         """Apply a soft root's wrench, and take away the last one."""

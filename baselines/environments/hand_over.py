@@ -134,14 +134,14 @@ def set_authority(h: HandOver, step: PolicyStep):
 
 @compiled
 def blend_torques(step: WholeStep):
-    """`views.ctrl`: (1 − w) times the controller's torques, in `step.base.tau`, w the servos'."""
+    """`views.ctrl`: (1 − w) times the controller's torques, `outputs.tau`, and w the servos'."""
     base, servos, w = step.base, step.servos, step.hand.memory[AUTHORITY]
-    views = base.world.views
+    views, tau = base.world.views, base.outputs.tau
     for i in range(views.ctrl.shape[0]):
         views.ctrl[i] = w * servo_torque(servos, base.world, i)
         if w < 1.0:
-            views.ctrl[i] += (1.0 - w) * base.tau[servos.dofs[i] - 6]
-    hand_to_motors(servos, base.world, w, base.tau)
+            views.ctrl[i] += (1.0 - w) * tau[servos.dofs[i] - 6]
+    hand_to_motors(servos, base.world, w, tau)
 
 
 @compiled

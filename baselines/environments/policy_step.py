@@ -6,7 +6,7 @@ import numpy as np
 
 from poise.baselines.balance.references.targets import Motion, update_targets
 from poise.baselines.balance.references.tempo import played_time
-from poise.baselines.controller import TargetArrays
+from poise.baselines.controller import Outputs, TargetArrays
 from poise.envs.balance.episode import (
     FAILURES,
     ROOT_FORCE,
@@ -124,15 +124,9 @@ class PolicyStep(Block):
     inputs: TargetInputs
     kernel: Kernel[Erased]  # the controller's tick
     tick: Erased  # that it works on
-    tau: np.ndarray  # (nj,) what it finds [N·m]
-    root_wrench: np.ndarray  # (6,) of a soft root
-    failures: np.ndarray  # (1,) int: ticks that it could not solve
-    soft_root: bool
-    vdot: np.ndarray  # (nv,) accelerations that they are to bring; (0,): not known
-    promise: np.ndarray  # (nv,) where the state source reads them; (0,): it does not
-    target: np.ndarray  # (nj,) q* of servos that give the torques; (0,): none do
-    stiffness: np.ndarray  # (nj,) of them
-    damping: np.ndarray  # (nj,)
+    outputs: Outputs  # what that finds
+    # (nv,) where the state source reads promised accelerations; (0,): it does not
+    promise: np.ndarray
     world: World
     estimate: Program  # of the state source
     ticks: int
@@ -144,26 +138,27 @@ class PolicyStep(Block):
 @compiled
 def promise_motion(step: PolicyStep):
     """Tell the state source which accelerations the controller's torques are to bring."""
-    if step.promise.shape[0] == step.vdot.shape[0]:
-        copy_into(step.vdot, step.promise)
+    vdot = step.outputs.vdot
+    if step.promise.shape[0] == vdot.shape[0]:
+        copy_into(vdot, step.promise)
 
 
 @compiled
 def ask_motors(step: PolicyStep):
     """Where the motors are real, let them run the controller's servos, if it has any."""
-    bus, world = step.world.bus, step.world
+    bus, world, o = step.world.bus, step.world, step.outputs
     bus.servoed[0] = 0
-    if bus.q.shape[0] > 0 and step.target.shape[0] > 0:
+    if bus.q.shape[0] > 0 and o.target.shape[0] > 0:
         for i in range(world.views.ctrl.shape[0]):
             j = world.robot.motor_dofs[i] - 6
-            besides = world.views.ctrl[i] - step.tau[j]
-            ask_servo(bus, i, besides, step.target[j], step.stiffness[j], step.damping[j])
+            besides = world.views.ctrl[i] - o.tau[j]
+            ask_servo(bus, i, besides, o.target[j], o.stiffness[j], o.damping[j])
 
 
 @compiled
 def policy_tick(step: PolicyStep):
     """The controller, held for `substeps` physics steps; `ticks` calls are a policy step."""
-    a, world, e, w = step.inputs, step.world, step.episode, step.root_wrench
+    a, world, e, o = step.inputs, step.world, step.episode, step.outputs
     robot, views, s = world.robot, world.views, world.state
     if e.ticks[0] == 0:
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
@@ -171,12 +166,12 @@ def policy_tick(step: PolicyStep):
     call(step.kernel, step.tick)
     promise_motion(step)
     for i in range(views.ctrl.shape[0]):
-        views.ctrl[i] = step.tau[robot.motor_dofs[i] - 6]
+        views.ctrl[i] = o.tau[robot.motor_dofs[i] - 6]
     add_torques(a.residual, robot.torque_limit, views.ctrl)
     ask_motors(step)
-    if step.soft_root:
+    if o.soft_root:
+        m, w = e.metrics, o.root_wrench
         soft_root_force(s, w, views.qfrc_applied)
-        m = e.metrics
         m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
         m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
     record_tick(robot, s.qvel, views.ctrl, step.substeps * robot.timestep, e)
@@ -193,22 +188,6 @@ def end_tick(step: PolicyStep):
     if e.ticks[0] < step.ticks:
         return
     e.ticks[0] = 0
-    copy_into(step.root_wrench, e.root_wrench)
-    e.metrics[FAILURES] = step.failures[0]
+    copy_into(step.outputs.root_wrench, e.root_wrench)
+    e.metrics[FAILURES] = step.outputs.failures[0]
     end_step(step.end)
-
-
-@dataclass(frozen=True, eq=False)
-class TickAccount(Block):
-    """The block of `account_tick`: what it reads, and the record that it writes."""
-
-    world: World
-    period: float  # [s]
-    episode: EpisodeArrays
-
-
-@compiled
-def account_tick(r: TickAccount):
-    """Account for the torques in `views.ctrl`."""
-    world = r.world
-    record_tick(world.robot, world.state.qvel, world.views.ctrl, r.period, r.episode)

@@ -24,7 +24,7 @@ from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import EnvConfig
-from poise.envs.balance.mdp.observation import Term, View, mirror_terms
+from poise.envs.balance.mdp.observation import Term, mirror_terms
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.robots.mirror import Mirror
@@ -194,12 +194,8 @@ class ResidualBalanceEnv(ControlledEnv):
             terms.append(Term("motors", names[targets:], "1", "", "motors"))
         return mirror_terms(terms, parts)
 
-    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
-        if kind is not MotionView:
-            return super()._view(kind, out)
-        view = super()._view(View, out)
-        assert isinstance(view, View)
-        return MotionView(view, self._motion)
+    def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        return (self._motion,) if kind is MotionView else super()._readings(kind)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref

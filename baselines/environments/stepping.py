@@ -6,14 +6,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from poise.baselines.balance.stepping.controller import SteppingController
-from poise.baselines.controller import Controller, as_base_controller
+from poise.baselines.controller import BaseController, Controller
 from poise.baselines.registry import ControllerConfig
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
-from poise.envs.balance.mdp.observation import View
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.memory import guarded_zeros
@@ -71,26 +68,17 @@ class ResidualStepEnv(ResidualBalanceEnv):
         self._step_report = guarded_zeros(REPORTED)
         super().__init__(robot, config, controller=controller, **arguments)
 
-    @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
-    def controller(self, controller: Controller) -> None:
-        """The controller whose targets and steps the action moves.
-
-        Raises ConfigError as `ResidualBalanceEnv` does, and for one that does not step.
-        """
-        stepper = as_base_controller(controller, self.robot).unwrapped
+    def _accept(self, controller: Controller, base: BaseController) -> None:
+        stepper = base.unwrapped
         if not isinstance(stepper, SteppingController):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
-        ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
+        super()._accept(controller, base)
         self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
         self._offsets = stepper.offsets.values  # one array is both
         self._residual = replace(self._residual, offsets=self._offsets)
 
-    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
-        if kind is not StepView:
-            return super()._view(kind, out)
-        view = super()._view(View, out)
-        assert isinstance(view, View)
-        return StepView(view, self._step_report)
+    def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        return (self._step_report,) if kind is StepView else super()._readings(kind)
 
     def _observe(self) -> None:
         self._step_report[:] = self.stepper.stepping().entries()

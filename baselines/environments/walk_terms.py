@@ -1,20 +1,20 @@
 """What is known of a walk: its strides as they were, and the terms that tell a policy of it."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.baselines.balance.stepping.planning.blocks import StepMemory
 from poise.baselines.walking.planner.blocks import Gait
 from poise.baselines.walking.planner.step import step_time
-from poise.envs.balance.mdp.observation import GROUND, Terms
+from poise.envs.balance.mdp.observation import GROUND, Terms, View
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 
-from .terms import PHASE, STEP_TERMS, StepView
+from .terms import PHASE, STEP_TERMS
 
 # entries of what is told of a walk
 WALKING, SIDE, CYCLE = range(3)  # 1 while it walks; the foot it stands on next; phase of the step
@@ -25,27 +25,19 @@ WALK_REPORTED = 3
 class Strides(Block):
     """The last three lift-offs of a walk, and how far the stride between them was off."""
 
-    when: np.ndarray  # (3,) times of the lift-offs, the latest first [s]
-    where: np.ndarray  # (3, 3) the CoM along the ground [m] and the heading [rad] then
-    count: np.ndarray  # (1,) int: lift-offs since the walk began
-    steps: np.ndarray  # (1,) int: steps begun since the reset, when this was looked at last
-    error: np.ndarray  # (3,) mean velocity less the command: ahead, left [m/s], turn [rad/s]
+    when: Annotated[np.ndarray, 3]  # times of the lift-offs, the latest first [s]
+    where: Annotated[np.ndarray, 3, 3]  # the CoM along the ground [m] and the heading [rad] then
+    count: Annotated[np.ndarray, 1, np.int64]  # lift-offs since the walk began
+    # steps begun since the reset, when this was looked at last
+    steps: Annotated[np.ndarray, 1, np.int64]
+    error: Annotated[
+        np.ndarray, 3
+    ]  # mean velocity less the command: ahead, left [m/s], turn [rad/s]
 
     def clear(self) -> None:
         """Forget the walk."""
         for member in (self.when, self.where, self.count, self.steps, self.error):
             member[...] = 0
-
-
-def no_strides() -> Strides:
-    """The strides of a walk that has not begun."""
-    return Strides(
-        when=guarded_zeros(3),
-        where=guarded_zeros((3, 3)),
-        count=guarded_zeros(1, dtype=np.int64),
-        steps=guarded_zeros(1, dtype=np.int64),
-        error=guarded_zeros(3),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +115,7 @@ def report_walk(r: WalkReporter):
 class WalkView(Block):
     """The block of a term about walking: what it reads, and the place that it fills."""
 
-    steps: StepView
+    seen: View
     gait: Gait
     report: np.ndarray  # (3,)
 
@@ -133,26 +125,26 @@ WALK_TERMS = Terms(STEP_TERMS, WalkView)  #: by name; those of every environment
 
 @WALK_TERMS.add(GROUND, "0.2 ω h", "velocity that is commanded, ahead and to the left", "vector")
 def command_velocity(t: WalkView):
-    seen = t.steps.seen
+    seen = t.seen
     for a in range(2):
         seen.out[a] = t.gait.command[a] / seen.scales.velocity
 
 
 @WALK_TERMS.add(("z",), "0.2 ω", "turn that is commanded, to the left", "turn")
 def command_turn(t: WalkView):
-    seen = t.steps.seen
+    seen = t.seen
     seen.out[0] = t.gait.command[2] / (0.2 * seen.scales.omega)
 
 
 @WALK_TERMS.add(("sin", "cos"), "1", "phase of the step, 0 at its lift-off; 0, 0: none", "number")
 def gait_phase(t: WalkView):
-    seen, angle = t.steps.seen, 2.0 * np.pi * t.report[CYCLE]
+    seen, angle = t.seen, 2.0 * np.pi * t.report[CYCLE]
     walks = 1.0 if t.report[SIDE] >= 0.0 else 0.0
     seen.out[0], seen.out[1] = walks * np.sin(angle), walks * np.cos(angle)
 
 
 @WALK_TERMS.add("feet", "1", "1 where the foot bears the robot, or is about to, else 0", "feet")
 def stance(t: WalkView):
-    out = t.steps.seen.out
+    out = t.seen.out
     for i in range(out.shape[0]):
         out[i] = 1.0 if int(t.report[SIDE]) == i else 0.0

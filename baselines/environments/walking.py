@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import Controller, as_base_controller
+from poise.baselines.controller import BaseController, Controller
 from poise.baselines.registry import ControllerConfig, walking_controllers
 from poise.baselines.walking.controller import WalkingController
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import CommandSampler, TimedCommand, command_sampler
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
-from poise.envs.balance.mdp.observation import View
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.memory import guarded_zeros
@@ -22,15 +21,7 @@ from poise.envs.robots.robot import Robot
 
 from .commanded import check_reach
 from .stepping import ResidualStepEnv
-from .terms import StepView
-from .walk_terms import (
-    WALK_REPORTED,
-    WALK_TERMS,
-    WalkReporter,
-    WalkView,
-    no_strides,
-    report_walk,
-)
+from .walk_terms import WALK_REPORTED, WALK_TERMS, Strides, WalkReporter, WalkView, report_walk
 
 SPEED_TOLERANCE = 0.036  # [ω h] of the last stride of a walk that goes on as it should
 
@@ -85,23 +76,17 @@ class ResidualWalkEnv(ResidualStepEnv):
     ):
         self.command_sampler = CommandSampler() if command is None else command_sampler(command)
         self._walk_report = guarded_zeros(WALK_REPORTED)
-        self._strides = no_strides()
+        self._strides = Strides.allocate()
         super().__init__(robot, config, controller=controller, **arguments)
 
-    @ResidualStepEnv.controller.setter
-    def controller(self, controller: Controller) -> None:
-        """The controller whose targets and steps the action moves.
-
-        Raises ConfigError as `ResidualStepEnv` does, for one that does not walk, and for one that
-        cannot follow all that `command` may draw: with the limits of the robot.
-        """
-        walker = as_base_controller(controller, self.robot).unwrapped
+    def _accept(self, controller: Controller, base: BaseController) -> None:
+        walker = base.unwrapped
         if not isinstance(walker, WalkingController):
             choices = walking_controllers(planners=True)
             raise ConfigError("does not walk", field="controller", choices=choices)
         for command in self.command_sampler.extremes():
             check_reach(walker, command)
-        ResidualStepEnv.controller.fset(self, controller)
+        super()._accept(controller, base)
         self.walker = walker  #: the controller that walks, of which `controller` may be a wrapper
 
     def arguments(self) -> dict[str, Any]:
@@ -119,13 +104,9 @@ class ResidualWalkEnv(ResidualStepEnv):
         super()._begin(options)
         self._strides.clear()
 
-    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
-        if kind is not WalkView:
-            return super()._view(kind, out)
-        view = super()._view(View, out)
-        assert isinstance(view, View)
-        steps = StepView(view, self._step_report)
-        return WalkView(steps, self.walker.gait, self._walk_report)
+    def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        walk = self.walker.gait, self._walk_report
+        return walk if kind is WalkView else super()._readings(kind)
 
     def _reporter(self) -> WalkReporter:
         walker, simulation = self.walker, self.simulation

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import CompiledController, Controller
+from poise.baselines.controller import BaseController, CompiledController, Controller
 from poise.baselines.registry import ControllerConfig
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
@@ -90,17 +90,12 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         super().__init__(robot, config, controller=controller, **arguments)
         self.servos = make_servos(self.robot, self.servo_config)
 
-    @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
-    def controller(self, controller: Controller) -> None:
-        """The controller that servos take over from.
-
-        Raises ConfigError as `ResidualBalanceEnv` does, and for one that cannot be handed over.
-        """
-        ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
-        if not self._compiled or not isinstance(controller, CompiledController):
+    def _accept(self, controller: Controller, base: BaseController) -> None:
+        super()._accept(controller, base)
+        if not self._compiled or not isinstance(base, CompiledController):
             raise ConfigError("has no compiled tick, from which servos could take over",
                               field="controller")  # fmt: skip
-        if controller.outputs().soft_root:
+        if base.outputs().soft_root:
             raise ConfigError("has a soft root, from which servos cannot take over",
                               field="controller")  # fmt: skip
 

@@ -11,7 +11,6 @@ from poise.baselines.controller import (
     COMMAND_ENTRIES,
     CompiledController,
     Outputs,
-    ServoOutputs,
     Targets,
 )
 from poise.configs.errors import ConfigError, PoiseError
@@ -212,8 +211,8 @@ class PolicyFile(CompiledController):
 
     def outputs(self) -> Outputs:
         s = self._servos
-        servos = ServoOutputs(s.target, s.stiffness, s.damping)
-        return Outputs(s.tau, self._no_wrench, self._failures, False, servos=servos)
+        servos = {"target": s.target, "stiffness": s.stiffness, "damping": s.damping}
+        return Outputs(s.tau, self._no_wrench, self._failures, False, **servos)
 
     def gains(self) -> Servos:
         """See `CompiledController`; raises what went wrong in the step before."""

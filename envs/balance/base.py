@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -16,9 +16,9 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, run
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
-from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.pushes.push import PushInfo, push_info
 from poise.envs.physics.simulation import Simulation, World
+from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot, on_terrain
 from poise.envs.sensing.estimator import EstimatedState
@@ -45,7 +45,7 @@ from .mdp.docstrings import filled
 from .mdp.observation import Term, Terms, View, frames, mirror_terms, observer, scales
 from .mdp.reward import REWARD_TERMS, RewardView, rewards
 from .mdp.termination import episode_limits
-from .mdp.terms import TERMS, MeasuredView
+from .mdp.terms import TERMS
 from .servos import holding_torques
 from .start import RESET_OPTIONS, chosen_pushes, chosen_start, reset_options
 
@@ -172,28 +172,16 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             "actions": self.action_names,
         }
 
-    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
-        """The block of a term that fills `out`, of the `kind` that its kernel works on."""
-        source = self.state_source
-        view = self._view_of(source.arrays, source.state_arrays, out)
-        if kind is not MeasuredView:
-            return view
-        if isinstance(source, EstimatedState):
-            return MeasuredView(view, source.sensors.rings, source.belief.steps, False)
-        return MeasuredView(
-            view, Rings.allocate(self.simulation.sizes), guarded_zeros(1, int), True
-        )
+    def _view(self, source: StateSource | Simulation, kind: type[Block], out: np.ndarray) -> Block:
+        """The block of a term that fills `out`, of the `kind` that its kernel works on.
 
-    def _true_view(self, kind: type[Block], out: np.ndarray) -> Block:
-        """The block of a term that fills `out` from the true robot's state."""
-        return self._view_of(self.simulation.arrays, self.simulation.state_arrays, out)
-
-    def _view_of(self, robot: RobotArrays, state: StateArrays, out: np.ndarray) -> View:
-        world = self.simulation.world()
+        It reads the robot and the state of `source`: those that are believed, or the true ones.
+        """
+        world, block = self.simulation.world(), cast(Any, kind)
         q_ref, v_ref = self._references()
-        return View(
-            robot=robot,
-            state=state,
+        seen = View(
+            robot=source.arrays,
+            state=source.state_arrays,
             scales=self.scales,
             q_ref=q_ref,
             v_ref=v_ref,
@@ -203,6 +191,14 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             pushes=world.pushes,
             out=out,
         )
+        return seen if kind is View else block(seen, *self._readings(kind))
+
+    def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        """The members of a block of this `kind` besides its `View`: here of a `MeasuredView`."""
+        source = self.state_source
+        if isinstance(source, EstimatedState):
+            return source.sensors.rings, source.belief.steps, False
+        return Rings.allocate(self.simulation.sizes), guarded_zeros(1, int), True
 
     def _judge(self) -> Judge:
         """The block that judges the policy steps of this environment."""
@@ -231,9 +227,11 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         if self._end is None or self._end_of is not world:
             e = self.episode
             seen, true = e.observation[: self.seen], e.observation[self.seen :]
-            calls = observer(self._newest, seen, e.steps, self._view)
+            believed = partial(self._view, self.state_source)
+            calls = observer(self._newest, seen, e.steps, believed)
             if self._privileged:
-                calls += observer(self._privileged, true, e.steps, self._true_view)
+                known = partial(self._view, self.simulation)
+                calls += observer(self._privileged, true, e.steps, known)
             self._end = StepEnd(self._judge(), Program.of(()), Program.of(calls))
             self._end_of = world
         return self._end

@@ -8,7 +8,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.physics.pushes.sampler import PushSampler
-from poise.envs.sensing.estimator import EstimatorConfig
+from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.realism import Realism, load_realism
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Terrain

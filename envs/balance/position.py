@@ -7,29 +7,23 @@ from typing import Any
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
-from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import CompiledStep, Program, address_of, run
+from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.kinematics import update_state
-from poise.envs.physics.simulation import World, physics_step
+from poise.envs.physics.simulation import physics_step
 from poise.envs.robots.robot import Robot
 
 from .base import EnvConfig
-from .episode import EpisodeArrays, StepEnd, end_step, record_tick
+from .episode import end_step, record_tick
 from .servos import ServoConfig, Servos, aim, drive, make_servos
-from .torque import MotorBalanceEnv
+from .torque import MotorBalanceEnv, MotorStep
 
 
 @dataclass(frozen=True, eq=False)
-class PositionStep(Block):
+class PositionStep(MotorStep):
     """All that a policy step works on."""
 
-    world: World
-    estimate: Program  # of the state source
     servos: Servos
-    substeps: int  # physics steps
-    episode: EpisodeArrays
-    end: StepEnd
 
 
 @compiled
@@ -73,6 +67,9 @@ class PositionBalanceEnv(MotorBalanceEnv):
     Version history: v0, first release.
     """
 
+    kernel = staticmethod(position_step)
+    step_block = PositionStep
+
     def __init__(
         self,
         robot: str | Path | Robot = "humanoid",
@@ -90,16 +87,8 @@ class PositionBalanceEnv(MotorBalanceEnv):
         """The arguments that make another environment like this one; the robot is shared."""
         return {**super().arguments(), "servos": self.servo_config}
 
-    def _make_step(self, world: World) -> CompiledStep:
-        block = PositionStep(
-            world=world,
-            estimate=self.state_source.estimate,
-            servos=self.servos,
-            substeps=self.substeps,
-            episode=self.episode,
-            end=self.step_end(),
-        )
-        return CompiledStep(address_of(position_step, block), block)
+    def _step_members(self) -> dict[str, Any]:
+        return {"servos": self.servos}
 
 
 def servo_config(servos: ServoConfig | Mapping | None) -> ServoConfig:

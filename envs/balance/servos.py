@@ -14,6 +14,7 @@ from poise.envs.physics.motor_bus import ask_servo
 from poise.envs.physics.simulation import World
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
+from poise.envs.robots.soles import sole_pose
 
 POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
 
@@ -150,10 +151,7 @@ def holding_torques(robot: Robot) -> np.ndarray:
     """
     model, data = robot.model, standing_data(robot)
     com = data.subtree_com[robot.root_body_id]
-    soles = [
-        data.xpos[sole.body_id] + data.xmat[sole.body_id].reshape(3, 3) @ sole.position
-        for sole in robot.soles
-    ]
+    soles = [sole_pose(data, sole)[0] for sole in robot.soles]
     fraction = np.clip((com[1] - soles[0][1]) / (soles[1][1] - soles[0][1]), 0.0, 1.0)
     torques = data.qfrc_bias - data.qfrc_passive
     jacobian = np.zeros((3, model.nv))

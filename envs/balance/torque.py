@@ -1,6 +1,8 @@
 """`poise/TorqueBalance-v0`: the action is the joints' torques."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,23 +17,22 @@ from .episode import EpisodeArrays, StepEnd, end_step, record_tick
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueStep(Block):
+class MotorStep(Block):
     """All that a policy step works on."""
 
     world: World
     estimate: Program  # of the state source
-    torque_limit: np.ndarray  # (nu,) [N·m]
     substeps: int  # physics steps
     episode: EpisodeArrays
     end: StepEnd
 
 
 @compiled
-def torque_step(step: TorqueStep):
+def torque_step(step: MotorStep):
     """Take a policy step: torques are held for `substeps` physics steps."""
     world, e, ctrl = step.world, step.episode, step.world.views.ctrl
     for i in range(ctrl.shape[0]):
-        ctrl[i] = e.action[i] * step.torque_limit[i]
+        ctrl[i] = e.action[i] * world.robot.torque_limit[i]
     record_tick(world.robot, world.state.qvel, ctrl, step.substeps * world.robot.timestep, e)
     simulate(world, step.substeps)
     run(step.estimate)
@@ -41,8 +42,11 @@ def torque_step(step: TorqueStep):
 class MotorBalanceEnv(BalanceEnv):
     """The base of environments whose action is a number for each motor (nu,).
 
-    The reference is the standing posture at rest. A subclass says by `_make_step` what is compiled.
+    The reference is the standing posture at rest. A subclass says what is compiled.
     """
+
+    kernel: ClassVar[Callable[..., None]]  #: takes a policy step
+    step_block: ClassVar[type[MotorStep]] = MotorStep  #: that it works on
 
     def _action_names(self) -> tuple[str, ...]:
         return self.robot.motor_names
@@ -53,8 +57,9 @@ class MotorBalanceEnv(BalanceEnv):
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self.arrays.q_standing, np.zeros(len(self.robot.joint_names))
 
-    def _make_step(self, world: World) -> CompiledStep:
-        raise NotImplementedError
+    def _step_members(self) -> dict[str, Any]:
+        """The members of `step_block` besides those of a `MotorStep`."""
+        return {}
 
     def advance(self) -> None:
         self.compiled_step().play()
@@ -63,7 +68,15 @@ class MotorBalanceEnv(BalanceEnv):
         """The compiled policy step; the same object while it can be used again."""
         world, known = self.simulation.world(), self._step
         if known is None or getattr(known.block, "world", None) is not world:
-            known = self._step = self._make_step(world)
+            block = self.step_block(
+                world=world,
+                estimate=self.state_source.estimate,
+                substeps=self.substeps,
+                episode=self.episode,
+                end=self.step_end(),
+                **self._step_members(),
+            )
+            known = self._step = CompiledStep(address_of(self.kernel, block), block)
         return known
 
 
@@ -87,13 +100,4 @@ class TorqueBalanceEnv(MotorBalanceEnv):
     Version history: v0, first release.
     """
 
-    def _make_step(self, world: World) -> CompiledStep:
-        block = TorqueStep(
-            world=world,
-            estimate=self.state_source.estimate,
-            torque_limit=self.arrays.torque_limit,
-            substeps=self.substeps,
-            episode=self.episode,
-            end=self.step_end(),
-        )
-        return CompiledStep(address_of(torque_step, block), block)
+    kernel = staticmethod(torque_step)

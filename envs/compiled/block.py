@@ -26,6 +26,7 @@ from numba.extending import (
     unbox,
 )
 from numba.np import numpy_support
+from numba.np.arrayobj import populate_array
 
 from .copies import portable
 from .memory import guarded_zeros
@@ -206,14 +207,6 @@ def _array(context: Any, builder: Any, kind: types.Array, word: Any) -> Any:
     for size in reversed(shape):
         strides.insert(0, stride)
         stride = builder.mul(stride, size, flags=["nsw"])
-    size = context.get_constant(types.intp, 1)
-    for length in shape:
-        size = builder.mul(size, length, flags=["nsw"])
-    array.data = builder.inttoptr(word(0), array.data.type)
-    array.shape = cgutils.pack_array(builder, shape)
-    array.strides = cgutils.pack_array(builder, strides)
-    array.itemsize = context.get_constant(types.intp, item)
-    array.nitems = size
-    array.meminfo = cgutils.get_null_value(array.meminfo.type)
-    array.parent = cgutils.get_null_value(array.parent.type)
+    data = builder.inttoptr(word(0), array.data.type)
+    populate_array(array, data, shape, strides, item, meminfo=None)
     return array._getvalue()

@@ -70,11 +70,9 @@ class SimViews(Block):
     xpos: np.ndarray
     xmat: np.ndarray
     xipos: np.ndarray
-    ximat: np.ndarray
     subtree_com: np.ndarray
     cdof: np.ndarray
     cdof_dot: np.ndarray
-    cvel: np.ndarray
     qfrc_bias: np.ndarray
     qfrc_passive: np.ndarray
     qfrc_constraint: np.ndarray

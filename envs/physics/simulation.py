@@ -53,7 +53,6 @@ class World(Block):
     motors: Program  # what comes of the controls, before each physics step
     sensors: Program  # what measures, after each physics step
     bus: MotorBus  # between the computer and the motors
-    count: np.ndarray  # (1,) int: physics steps of `advance_world`
 
 
 @compiled
@@ -72,12 +71,6 @@ def simulate(world: World, count: int):
     update_state(world.robot, world.views, world.state)
 
 
-@compiled
-def advance_world(world: World):
-    """`simulate` for a caller in Python."""
-    simulate(world, world.count[0])
-
-
 class Simulation(Copyable):
     """A robot on its terrain. `state` is current after `reset` and after every `step`."""
 
@@ -89,7 +82,6 @@ class Simulation(Copyable):
         self.views = sim_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles), robot.model.nbody)
         self.clock = guarded_zeros(1, dtype=np.int64)
-        self._count = guarded_zeros(1, dtype=np.int64)
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
         self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
@@ -113,7 +105,6 @@ class Simulation(Copyable):
                 motors=self.motors,
                 sensors=self.sensors,
                 bus=self.bus,
-                count=self._count,
             )
         return self._world
 
@@ -171,6 +162,5 @@ class Simulation(Copyable):
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""
         self.views.ctrl[:] = torques
-        self._count[0] = count
-        advance_world(self.world())
+        simulate(self.world(), count)
         return self.state

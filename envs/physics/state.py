@@ -9,12 +9,86 @@ from .arrays import RobotArrays
 from .kinematics import StateArrays, support_distance, update_support
 
 
+class ArrayView:
+    """A read-only view of an array of a state, by default of the one of its own name."""
+
+    def __init__(self, name: str = "", part: slice = slice(None)):
+        self.name, self.part = name, part
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = self.name or name
+
+    def __get__(self, state: "RobotState | None", owner: type) -> np.ndarray:
+        if state is None:  # asked of the class
+            return self  # type: ignore[return-value]
+        view: np.ndarray = getattr(state.arrays, self.name)[self.part]
+        view.flags.writeable = False
+        return view
+
+
 class RobotState(Copyable):
     """Every kinematic and centroidal quantity of one tick; read-only views, world axes.
 
     The arrays are those of a running `Simulation` and change when it moves on; `copy()` keeps
     them. Sizes: nv degrees of freedom, nc soles. Symbols as in docs/notation.md.
     """
+
+    qpos = ArrayView()
+    """(nq,) MuJoCo's generalised position: root position, quaternion wxyz, joints."""
+    qvel = ArrayView()
+    """(nv,) v: root velocity (linear world, angular body axes), joint velocities."""
+    motor_q = ArrayView()
+    """(nv−6,) joint positions as the motors' own encoders read them now, never late [rad]."""
+    motor_dq = ArrayView()
+    """(nv−6,) joint velocities likewise [rad/s]."""
+    M = ArrayView()
+    """(nv, nv) joint-space inertia."""
+    h = ArrayView()
+    """(nv,) bias minus passive force: M v̇ + h = Sᵀτ + Jᵀw."""
+    root_axes = ArrayView()
+    """(3, 3) the root body's axes as columns."""
+    com = ArrayView()
+    """(3,) c, centre of mass [m]."""
+    com_vel = ArrayView()
+    """(3,) ċ [m/s]."""
+    linear_momentum = ArrayView("momentum", slice(3))
+    """(3,) P = A_P v [N·s]."""
+    angular_momentum = ArrayView("momentum", slice(3, None))
+    """(3,) L = A_L v about the centre of mass [N·m·s]."""
+    A = ArrayView()
+    """(6, nv) centroidal momentum matrix, [P; L] = A v [Orin08]."""
+    A_bias = ArrayView()
+    """(6,) such that A v̇ + A_bias is the ground's wrench about c: [Ṗ − m g; L̇]."""
+    load = ArrayView()
+    """(3,) force f_z [N] and moments n_x, n_y about the known CoM [N·m] that are believed to
+    last, beside gravity and ground; h, A_bias and the CoM have them in already."""
+    J = ArrayView()
+    """(6 nc, nv) sole Jacobians: linear velocity of the reference point, then angular."""
+    J_v = ArrayView()
+    """(6 nc,) sole velocities J v."""
+    Jdot_v = ArrayView()
+    """(6 nc,) J̇ v."""
+    sole_points = ArrayView("sole_point")
+    """(nc, 3) sole reference points [m]."""
+    sole_axes = ArrayView()
+    """(nc, 3, 3) sole axes as columns: forward, left, up when standing."""
+    origin = ArrayView()
+    """(3,) origin of the heading frame: mean of the sole reference points [m].
+
+    On a terrain it is as high as the soles that touch the ground are in the mean.
+    """
+    heading = ArrayView()
+    """(2,) cosine and sine of the heading frame's yaw."""
+    contact_wrench = ArrayView()
+    """(6,) force [N] and moment about the world origin [N·m] of the ground, last step."""
+    ground = ArrayView()
+    """(nc,) height of the ground below each sole's reference point [m]."""
+    cop = ArrayView()
+    """(2,) p, centre of pressure on the ground [m]; on a terrain at the height of `origin`."""
+    capture_point = ArrayView()
+    """(2,) ξ = c + ċ/ω on the ground [m]."""
+    contacts = ArrayView()
+    """(nc,) 1 where the foot touches the ground, else 0."""
 
     def __init__(self, robot: RobotArrays, arrays: StateArrays, time: float = 0.0):
         self.robot, self.arrays, self.time = robot, arrays, time
@@ -25,16 +99,6 @@ class RobotState(Copyable):
         return RobotState(self.robot, arrays, self.time)
 
     @property
-    def qpos(self) -> np.ndarray:
-        """(nq,) MuJoCo's generalised position: root position, quaternion wxyz, joints."""
-        return _frozen(self.arrays.qpos)
-
-    @property
-    def qvel(self) -> np.ndarray:
-        """(nv,) v: root velocity (linear world, angular body axes), joint velocities."""
-        return _frozen(self.arrays.qvel)
-
-    @property
     def mass(self) -> float:
         """m [kg]."""
         return self.robot.mass
@@ -43,67 +107,6 @@ class RobotState(Copyable):
     def q(self) -> np.ndarray:
         """(nv−6,) joint positions [rad]."""
         return self.qpos[7:]
-
-    @property
-    def motor_q(self) -> np.ndarray:
-        """(nv−6,) joint positions as the motors' own encoders read them now, never late [rad]."""
-        return _frozen(self.arrays.motor_q)
-
-    @property
-    def motor_dq(self) -> np.ndarray:
-        """(nv−6,) joint velocities likewise [rad/s]."""
-        return _frozen(self.arrays.motor_dq)
-
-    @property
-    def M(self) -> np.ndarray:
-        """(nv, nv) joint-space inertia."""
-        return _frozen(self.arrays.M)
-
-    @property
-    def h(self) -> np.ndarray:
-        """(nv,) bias minus passive force: M v̇ + h = Sᵀτ + Jᵀw."""
-        return _frozen(self.arrays.h)
-
-    @property
-    def root_axes(self) -> np.ndarray:
-        """(3, 3) the root body's axes as columns."""
-        return _frozen(self.arrays.root_axes)
-
-    @property
-    def com(self) -> np.ndarray:
-        """(3,) c, centre of mass [m]."""
-        return _frozen(self.arrays.com)
-
-    @property
-    def com_vel(self) -> np.ndarray:
-        """(3,) ċ [m/s]."""
-        return _frozen(self.arrays.com_vel)
-
-    @property
-    def linear_momentum(self) -> np.ndarray:
-        """(3,) P = A_P v [N·s]."""
-        return _frozen(self.arrays.momentum[:3])
-
-    @property
-    def angular_momentum(self) -> np.ndarray:
-        """(3,) L = A_L v about the centre of mass [N·m·s]."""
-        return _frozen(self.arrays.momentum[3:])
-
-    @property
-    def A(self) -> np.ndarray:
-        """(6, nv) centroidal momentum matrix, [P; L] = A v [Orin08]."""
-        return _frozen(self.arrays.A)
-
-    @property
-    def A_bias(self) -> np.ndarray:
-        """(6,) such that A v̇ + A_bias is the ground's wrench about c: [Ṗ − m g; L̇]."""
-        return _frozen(self.arrays.A_bias)
-
-    @property
-    def load(self) -> np.ndarray:
-        """(3,) force f_z [N] and moments n_x, n_y about the known CoM [N·m] that are believed to
-        last, beside gravity and ground; h, A_bias and the CoM have them in already."""
-        return _frozen(self.arrays.load)
 
     @property
     def friction(self) -> float:
@@ -118,57 +121,9 @@ class RobotState(Copyable):
         return bias
 
     @property
-    def J(self) -> np.ndarray:
-        """(6 nc, nv) sole Jacobians: linear velocity of the reference point, then angular."""
-        return _frozen(self.arrays.J)
-
-    @property
-    def J_v(self) -> np.ndarray:
-        """(6 nc,) sole velocities J v."""
-        return _frozen(self.arrays.J_v)
-
-    @property
-    def Jdot_v(self) -> np.ndarray:
-        """(6 nc,) J̇ v."""
-        return _frozen(self.arrays.Jdot_v)
-
-    @property
-    def sole_points(self) -> np.ndarray:
-        """(nc, 3) sole reference points [m]."""
-        return _frozen(self.arrays.sole_point)
-
-    @property
-    def sole_axes(self) -> np.ndarray:
-        """(nc, 3, 3) sole axes as columns: forward, left, up when standing."""
-        return _frozen(self.arrays.sole_axes)
-
-    @property
-    def origin(self) -> np.ndarray:
-        """(3,) origin of the heading frame: mean of the sole reference points [m].
-
-        On a terrain it is as high as the soles that touch the ground are in the mean.
-        """
-        return _frozen(self.arrays.origin)
-
-    @property
-    def heading(self) -> np.ndarray:
-        """(2,) cosine and sine of the heading frame's yaw."""
-        return _frozen(self.arrays.heading)
-
-    @property
     def heading_yaw(self) -> float:
         """Yaw of the heading frame [rad]: mean forward axis of the soles on the ground."""
         return float(np.arctan2(self.arrays.heading[1], self.arrays.heading[0]))
-
-    @property
-    def contact_wrench(self) -> np.ndarray:
-        """(6,) force [N] and moment about the world origin [N·m] of the ground, last step."""
-        return _frozen(self.arrays.contact_wrench)
-
-    @property
-    def ground(self) -> np.ndarray:
-        """(nc,) height of the ground below each sole's reference point [m]."""
-        return _frozen(self.arrays.ground)
 
     @property
     def support_height(self) -> float:
@@ -176,24 +131,9 @@ class RobotState(Copyable):
         return float(self.arrays.origin[2]) if len(self.robot.surfaces) else 0.0
 
     @property
-    def cop(self) -> np.ndarray:
-        """(2,) p, centre of pressure on the ground [m]; on a terrain at the height of `origin`."""
-        return _frozen(self.arrays.cop)
-
-    @property
-    def capture_point(self) -> np.ndarray:
-        """(2,) ξ = c + ċ/ω on the ground [m]."""
-        return _frozen(self.arrays.capture_point)
-
-    @property
     def omega(self) -> float:
         """ω = √(g/z_c) [1/s]."""
         return float(self.arrays.omega[0])
-
-    @property
-    def contacts(self) -> np.ndarray:
-        """(nc,) 1 where the foot touches the ground, else 0."""
-        return _frozen(self.arrays.contacts)
 
     @property
     def other_contact(self) -> bool:
@@ -220,9 +160,3 @@ class RobotState(Copyable):
         angle = np.radians(direction) + self.heading_yaw
         ray = np.array([np.cos(angle), np.sin(angle)])
         return ray_to_edge(self.support_polygon, self.com[:2], ray)
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    view = array.view()
-    view.flags.writeable = False
-    return view

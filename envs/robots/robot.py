@@ -36,7 +36,7 @@ from .models.humanoid import humanoid_spec
 from .models.mjcf import pointing_to_scenes, read_mjcf
 from .models.mjcf_bounds import bound_cache
 from .models.urdf import read_urdf
-from .soles import Sole, find_sole_plane, sole_frame, sole_geoms
+from .soles import Sole, find_sole_plane, sole_frame, sole_geoms, sole_pose
 from .standing import Stance, described_qpos
 
 BUILDERS = {"humanoid": humanoid_spec}
@@ -272,8 +272,7 @@ def _stand(
         )
         for i, foot in enumerate(description.feet)
     )
-    points = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position for s in soles]
-    data.qpos[:3] -= np.mean(points, axis=0)
+    data.qpos[:3] -= np.mean([sole_pose(data, sole)[0] for sole in soles], axis=0)
     data.qpos[2] -= TOUCH
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)

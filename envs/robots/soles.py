@@ -37,6 +37,12 @@ class Sole:
             array.setflags(write=False)
 
 
+def sole_pose(data: mujoco.MjData, sole: Sole) -> tuple[np.ndarray, np.ndarray]:
+    """Point (3,) [m] and axes (3, 3) of a sole in the world, where `data` has its foot."""
+    axes = data.xmat[sole.body_id].reshape(3, 3)
+    return data.xpos[sole.body_id] + axes @ sole.position, axes @ sole.rotation
+
+
 @dataclass(frozen=True)
 class SolePlane:
     """The plane a foot rests on, in the foot body's frame."""

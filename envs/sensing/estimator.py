@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated
 from weakref import WeakKeyDictionary
 
 import mujoco
@@ -26,75 +26,23 @@ from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot, on_terrain
 from poise.envs.terrain.flat import Flat
 
-from .drawn import DrawnRobot
+from .config import EstimatorConfig
+from .drawn import DrawnRobot, Plant
 from .external_force import ExternalForce, bear_load, begin_force, keep_load, observe_force
 from .friction import SlidingFriction, allocate_friction, begin_friction, learn_friction
-from .inekf import Invariant, InvariantConfig, begin_invariant, follow_invariant
+from .inekf import Invariant, begin_invariant, follow_invariant
 from .measurement import RING, Rings, Sensors, arrived, begin_sensors, measure
 from .motors import Motors, begin_motors, drive_motors
 from .odometry import Odometry, begin_odometry, copy_axes, follow_measurements
-from .plant import Plant
 from .prediction import Promises, Rollout, keep_promises, predict, roll_out
 from .realism import Realism
 
-POSITIVE = {"above": 0.0}
 #: entries of `Belief.steps`
 SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(8)
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
 WITHOUT_CONTACTS: WeakKeyDictionary[Robot, Robot] = WeakKeyDictionary()
 SINK = 0.05  # of the height error of the soles that a tick takes away
-
-
-@dataclass(frozen=True)
-class EstimatorConfig:
-    """How the state is estimated.
-
-    Attributes:
-        kind: Estimator of the state: `odometry` integrates the accelerometer and is corrected by
-            legs that stand; `inekf` is the invariant Kalman filter of the same measurements;
-            `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
-            whose sensors have no errors, and else `odometry`.
-        predictor: Way in which the state is led on to when the torques of this tick will act:
-            `promised` by the accelerations that the QP has promised, `rollout` by a simulation of
-            the known robot with what its motors were asked for, `none` not at all; `auto` is
-            `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
-        external_force: Whether a rollout is pushed on by the force that nothing else explains.
-        load: Whether a load that lasts is learned and borne, where sensors err or bodies are drawn:
-            a payload, masses and centres of mass that are other than known.
-        load_time: Time in which a load is learned [s].
-        slide_speed: Speed from which soles are taken to slide, and then tell how much friction a QP
-            may count on [m/s]; 0: never.
-        filtered: Whether joint velocities are filtered.
-        joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
-        turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
-        acceleration: Error of the accelerometer besides its noise, from step to step [m/s²].
-        bias: Error of accelerometer and attitude together at the start [m/s²].
-        bias_walk: Change of that error in a second [m/s²].
-        slip: Error of a velocity that one leg tells, besides the joints' noise [m/s].
-        roll_radius: Error of that velocity for each rad/s that the sole turns by [m].
-        invariant: What only `inekf` goes by.
-    """
-
-    kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
-    predictor: Literal["auto", "promised", "rollout", "none"] = "auto"
-    external_force: bool = True
-    load: bool = True
-    load_time: float = field(default=2.0, metadata=POSITIVE)
-    slide_speed: float = field(default=0.4, metadata={"min": 0.0})
-    filtered: bool = True
-    joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
-    turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
-    acceleration: float = field(default=0.05, metadata=POSITIVE)
-    bias: float = field(default=0.2, metadata=POSITIVE)
-    bias_walk: float = field(default=0.1, metadata=POSITIVE)
-    slip: float = field(default=0.15, metadata=POSITIVE)
-    roll_radius: float = field(default=3.0, metadata=POSITIVE)
-    invariant: InvariantConfig = field(default_factory=InvariantConfig)
-
-
-#: of a controller that brings an estimator of its own: what is measured, as late and as noisy
-RAW = EstimatorConfig("odometry", predictor="none", load=False, slide_speed=0.0, filtered=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,8 @@ and ζ = b̂ − b, with covariance P of (ξ_R, ξ_v, ξ_p, ξ_d, ζ_g, ζ_a). W
 linear equation exactly, wherever the state is [Barrau17].
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -21,40 +19,14 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
 
+from .config import EstimatorConfig
 from .measurement import DRIFT_TIME
 from .odometry import LOAD, START_SPEED, Odometry, copy_axes, keep_joints, place_pressure
 from .prediction import turn_axes
 
-if TYPE_CHECKING:
-    from .estimator import EstimatorConfig
-
 V, P_, D = 0, 1, 2  # rows of `Invariant.place`; D is the first sole's
 #: entries of `Invariant.numbers`
 GYRO, FORCE, GYRO_WALK, FORCE_WALK, ATTITUDE, ENCODER, KINEMATICS, SLIDE, ROLL, LIFT = range(10)
-NOT_NEGATIVE = {"min": 0.0}
-
-
-@dataclass(frozen=True)
-class InvariantConfig:
-    """What the invariant filter thinks of the world, besides the noises of the sensors.
-
-    Attributes:
-        gyro_bias: Bias of the gyroscope at the start, as `inekf` thinks [rad/s].
-        gyro_bias_walk: Change of that bias in a second [rad/s].
-        attitude: Error of the attitude besides its drift, taken as new in every step [rad].
-        kinematics: Error of a sole's place besides the encoders' noise [m].
-        slide: Way that a sole that bears the robot wanders in a second [m].
-        roll: Way that such a sole wanders for each rad/s that it turns by [m].
-        lift: Way that a sole in the air may go in a second [m].
-    """
-
-    gyro_bias: float = field(default=0.02, metadata=NOT_NEGATIVE)
-    gyro_bias_walk: float = field(default=0.001, metadata=NOT_NEGATIVE)
-    attitude: float = field(default=0.01, metadata={"above": 0.0})
-    kinematics: float = field(default=0.002, metadata={"above": 0.0})
-    slide: float = field(default=0.02, metadata=NOT_NEGATIVE)
-    roll: float = field(default=0.1, metadata=NOT_NEGATIVE)
-    lift: float = field(default=5.0, metadata=NOT_NEGATIVE)
 
 
 @dataclass(frozen=True, eq=False)

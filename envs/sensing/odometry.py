@@ -1,10 +1,8 @@
 """The state of a robot from an IMU, encoders and soles, by its legs and its accelerometer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -15,11 +13,9 @@ from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
+from .config import EstimatorConfig
 from .measurement import Rings
 from .prediction import Promises
-
-if TYPE_CHECKING:
-    from .estimator import EstimatorConfig
 
 FROM_Q, FROM_DQ = 0, 1  # columns of `Odometry.gains`
 STIR, WANDER, SLIP, ROLL, JOINT_NOISE, RATE_GAIN = range(6)  # entries of `Odometry.numbers`

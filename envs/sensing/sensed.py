@@ -11,9 +11,9 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot
 
-from .drawn import DrawnRobot, draw_robot
-from .estimator import RAW, EstimatedState, EstimatorConfig, check_latency
-from .plant import Plant, check_limbs
+from .config import RAW, EstimatorConfig
+from .drawn import DrawnRobot, Plant, check_limbs, draw_robot
+from .estimator import EstimatedState, check_latency
 from .realism import Realism, overlaid
 
 

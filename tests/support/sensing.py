@@ -8,9 +8,9 @@ import numpy as np
 
 from poise.configs.schema import build
 from poise.envs.compiled.calls import run
-from poise.envs.sensing.drawn import DrawnRobot, draw_robot
-from poise.envs.sensing.estimator import EstimatedState, EstimatorConfig
-from poise.envs.sensing.plant import Plant
+from poise.envs.sensing.config import EstimatorConfig
+from poise.envs.sensing.drawn import DrawnRobot, Plant, draw_robot
+from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.realism import load_realism
 from tests.support.shared import robot
 

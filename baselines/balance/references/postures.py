@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.envs.compiled.copies import Copyable
 from poise.envs.robots.robot import Robot
-from poise.envs.robots.soles import Sole
+from poise.envs.robots.soles import sole_pose
 
 
 class LevelPosture(NamedTuple):
@@ -16,12 +16,6 @@ class LevelPosture(NamedTuple):
 
     com: np.ndarray  # (3,) [m]
     root_axes: np.ndarray  # (3, 3) root orientation
-
-
-def sole_pose(data: mujoco.MjData, sole: Sole) -> tuple[np.ndarray, np.ndarray]:
-    """Point (3,) [m] and axes (3, 3) of a sole in the world, where `data` has its foot."""
-    axes = data.xmat[sole.body_id].reshape(3, 3)
-    return data.xpos[sole.body_id] + axes @ sole.position, axes @ sole.rotation
 
 
 def most_beyond(robot: Robot, joints: np.ndarray) -> tuple[int, int, float]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import Controller
+from poise.baselines.controller import BaseController, Controller
 from poise.baselines.environments.hand_over import (
     AUTHORITY,
     CALM,
@@ -107,10 +107,8 @@ class GuardedEnv(ResidualWholeEnv):
         self._guard = Guard(guard.margin, float(np.cos(guard.tilt)), guarded_zeros(1, np.int64))
         super().__init__(*arguments, **named)
 
-    @ResidualWholeEnv.controller.setter
-    def controller(self, controller: Controller) -> None:
-        """The walker. Raises ConfigError as `ResidualWholeEnv`, and for one that does not walk."""
-        ResidualWholeEnv.controller.fset(self, controller)
+    def _accept(self, controller: Controller, base: BaseController) -> None:
+        super()._accept(controller, base)
         if self.command is None:
             raise ConfigError("does not walk: it sees no velocity_commands", field="walker")
 

@@ -1,5 +1,6 @@
 """Policy steps that compiled code plays by their addresses, many of them in several threads."""
 
+import os
 import time
 
 import numpy as np
@@ -9,7 +10,7 @@ from poise.envs.compiled.atomics import look_at, swap, take_turn
 from poise.envs.compiled.calls import call, play_one
 from poise.envs.compiled.jit import compiled
 
-from .threads import ThreadTeam, tell_of_fork
+from .threads import ThreadTeam
 
 SPLIT = 1  # steps for each thread that are shared out tick by tick at the end
 MANY = 6  # steps for each thread from which on that is worth its while
@@ -42,20 +43,19 @@ class StepSchedule:
         # of each helper, in a line of its own: AWAY, WAITING or CALLED; 1 once it has played
         self.calls = np.zeros(LINE * threads, dtype=np.int64)
         self.played = np.zeros(LINE * threads, dtype=np.int64)
-        tell_of_fork(self)
+        self._process = os.getpid()  # that the threads are of
 
     def __reduce__(self) -> tuple[object, ...]:
         if len(self.steps):
             raise PoiseError("turns hold addresses: copy the environments that they are of")
         return StepSchedule, (NOTHING, len(self.turns))
 
-    def forget_threads(self) -> None:
-        """Mark that nobody plays or waits: the threads that did are another process's."""
-        self.calls[:] = AWAY
-        self.taken[:] = 0
-
     def begin(self) -> None:
-        """Have all steps played once more."""
+        """Have all steps played once more; in a forked process nobody plays or waits yet."""
+        if self._process != os.getpid():
+            self._process = os.getpid()
+            self.calls[:] = AWAY
+            self.taken[:] = 0
         self.turns[:] = self.ends[:-1]
         self.done[:] = 0
 

@@ -5,37 +5,13 @@ import threading
 import weakref
 from collections.abc import Callable
 from queue import SimpleQueue
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 from poise.configs.errors import PoiseError
 
 Raised: TypeAlias = SimpleQueue[BaseException | None]  # what the work of helpers has raised
 #: what a helper is asked: work, its number, where what it raised goes; None: to end
 Call: TypeAlias = tuple[Callable[[int], None], int, Raised | None] | None
-
-
-class Watcher(Protocol):
-    """Holds threads, which a forked process does not have."""
-
-    def forget_threads(self) -> None:
-        """Forget them: they are threads of another process."""
-
-
-_watchers: weakref.WeakSet[Watcher] = weakref.WeakSet()
-
-
-def tell_of_fork(watcher: Watcher) -> None:
-    """Have `watcher.forget_threads()` called in a forked process: it has none but its own."""
-    _watchers.add(watcher)
-
-
-def _forget() -> None:
-    for watcher in list(_watchers):
-        watcher.forget_threads()
-
-
-if hasattr(os, "register_at_fork"):  # not on Windows
-    os.register_at_fork(after_in_child=_forget)
 
 
 class ThreadTeam:
@@ -48,15 +24,10 @@ class ThreadTeam:
         self._calls: list[SimpleQueue[Call]] = []
         self._threads: list[threading.Thread] = []
         self._end = weakref.finalize(self, _end, self._calls)
-        tell_of_fork(self)
+        self._process = os.getpid()  # that the threads are of
 
     def __reduce__(self) -> tuple[object, ...]:
         return ThreadTeam, ()
-
-    def forget_threads(self) -> None:
-        """Forget those who have been asked: they are threads of another process."""
-        self._calls.clear()
-        self._threads.clear()
 
     def distribute(self, work: Callable[[int], None], helpers: int) -> None:
         """`work(0)` in this thread, `work(1)`, `work(2)`… in some helpers; returns when all have.
@@ -82,6 +53,10 @@ class ThreadTeam:
         """
         if not self._end.alive:
             raise PoiseError("the threads have ended: close() comes last")
+        if self._process != os.getpid():  # a fork has none of them
+            self._process = os.getpid()
+            self._calls.clear()
+            self._threads.clear()
         self.expect_alive()
         while len(self._calls) < helper:
             self._calls.append(SimpleQueue())

@@ -5,7 +5,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.physics.simulation import Simulation
-from poise.envs.sensing.estimator import EstimatorConfig
+from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.friction import sliding_sole
 from tests.support.shared import robot
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.envs.sensing.estimator import EstimatedState, EstimatorConfig
+from poise.envs.sensing.config import EstimatorConfig
+from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.odometry import LEAST, filter_gains, rate_gain
 from tests.support.sensing import PLAIN, estimated, start
 from tests.support.shared import robot

@@ -1,4 +1,4 @@
-"""envs/sensing/plant.py: bodies and ground of an episode."""
+"""`Plant` of envs/sensing/drawn.py: bodies and ground of an episode."""
 
 import mujoco
 import numpy as np
@@ -10,7 +10,7 @@ from poise.envs.physics.arms import find_arms
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain
-from poise.envs.sensing.plant import CHANGED, Plant
+from poise.envs.sensing.drawn import CHANGED, Plant
 from poise.envs.terrain.arrays import ground_height
 from poise.envs.terrain.bumps import Bumps
 from tests.support.physics import random_state

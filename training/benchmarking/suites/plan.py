@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from poise.envs.sensing.plant import check_limbs
+from poise.envs.sensing.drawn import check_limbs
 from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial

@@ -14,7 +14,8 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.mdp.termination import uprightness
 from poise.envs.balance.vector.batch import replicate
-from poise.envs.sensing.estimator import RAW, EstimatedState, EstimatorConfig
+from poise.envs.sensing.config import RAW, EstimatorConfig
+from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.realism import load_realism
 from tests.support.policies import linear, write_onnx, write_yaml
 from tests.support.shared import robot as shared_robot

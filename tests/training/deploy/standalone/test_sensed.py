@@ -11,7 +11,7 @@ import pytest
 import poise
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError, PoiseError
-from poise.envs.sensing.estimator import EstimatorConfig
+from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.measurement import RING
 from poise.envs.sensing.motors import STIFFNESS
 from poise.envs.sensing.realism import load_realism
