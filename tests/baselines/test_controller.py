@@ -12,7 +12,6 @@ import pytest
 import poise
 from poise.baselines import (
     BaseController,
-    CaptureStep,
     CompiledController,
     Controller,
     MomentumQP,
@@ -146,10 +145,11 @@ def test_a_subclass_runs_compiled_unless_its_torques_are_its_own() -> None:
 
 
 def test_another_solver_is_called_from_python() -> None:
+    """By the momentum QP; controllers that step refuse it."""
     controller = load_controller({"solver": "daqp"}, robot())
     assert isinstance(controller, CompiledController) and not controller.compiled
-    stepping = load_controller({"kind": "capture-step", "qp": {"solver": "daqp"}}, robot())
-    assert isinstance(stepping, CaptureStep) and not stepping.compiled
+    with pytest.raises(poise.ConfigError, match=r"qp\.solver: must be 'active-set'"):
+        load_controller({"kind": "capture-step", "qp": {"solver": "daqp"}}, robot())
 
 
 def test_an_environment_is_replicated_with_a_controller_of_the_same_class() -> None:
