@@ -172,13 +172,14 @@ def _rates(
         and all(value is None or record.line[key] == value for key, value in required.items())
     ]
     found = counted(pairs)
-    if found is None or not len(pairs) == one["trials"] == two["trials"]:
+    ends = None if found is None else both_ends(found["rate_gain_ci95"])
+    if found is None or ends is None or not len(pairs) == one["trials"] == two["trials"]:
         estimates = ((r["recovered_rate"], r["recovered_ci95"]) for r in (one, two))
         yield from _by_intervals(name, title, *estimates)
         return
     note = f"{found['only_a']} lost, {found['only_b']} won, p = {found['p_mcnemar']:.2g}"
     rates = one["recovered_rate"], two["recovered_rate"]
-    yield Change(name, title, *rates, found["rate_gain"], *found["rate_gain_ci95"], note)
+    yield Change(name, title, *rates, found["rate_gain"], *ends, note)
 
 
 def _levels(one: Entry, two: Entry) -> Iterator[tuple[tuple[str, str], Level, Level]]:

@@ -98,34 +98,39 @@ def film(
     controllers: Sequence[str],
     path: str | Path,
     *,
+    fps: float | None = None,
+    size: tuple[int, int] | None = None,
     allow: str | Iterable[str] = (),
 ) -> None:
     """Play a trial of a result again with some controllers and film them side by side.
 
-    The camera stands beside the first push (`beside`). Size and rate are those of `record`, but
-    `NARROW` of several that are no WebP.
+    The camera stands beside the first push (`beside`).
 
     Args:
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
         trial: its number in trials.csv; all of `controllers` have played it.
         controllers: names, from left to right.
         path: of the video, ending in .mp4 or .webp.
+        fps: frames a second that are wanted [1/s]; None: as of `record`.
+        size: width and height of each picture [pixels]; None: as of `record`, but `NARROW` of
+            several that are no WebP.
         allow: controllers from outside (``module:Class``) that may run.
 
     Raises:
-        ConfigError: as `replay`, and for a path that is not valid.
+        ConfigError: as `replay`, and for a path or size that is not valid.
         PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
     """
-    size, rate = usual(path)
-    if len(controllers) > 1 and size == SIZE:
-        size = NARROW
+    usual_size, usual_rate = usual(path)
+    if len(controllers) > 1 and usual_size == SIZE:
+        usual_size = NARROW
+    size, fps = size or usual_size, fps or usual_rate
     with _opened(folder, allow) as results, ExitStack() as stack:
         episodes = {}
         for name in controllers:
             again = results.trial(results.record(name, trial))
             episode = _episode(results, name, again, size)
             episodes[name] = stack.enter_context(episode)
-        record_together(episodes, path, fps=rate)
+        record_together(episodes, path, fps=fps)
 
 
 @contextmanager

@@ -150,17 +150,19 @@ def figures_of(
 ) -> GaitFigures:
     """The figures of walks: falls of all of them, the rest of those that did not fall."""
     stood = [outcome for outcome in outcomes if not outcome.fallen]
-    means = {key: mean_or_none([getattr(each, key) for each in stood]) for key in MEANS}
+    found: dict[str, Any] = {
+        key: mean_or_none([getattr(each, key) for each in stood]) for key in MEANS
+    }
     knees = np.concatenate([np.zeros((0, POINTS)), *(each.knees for each in stances)])
-    found: dict[str, Any] = {"knee_stance": None, "knee_rmse": None, "knee_curve": ()}
+    found |= {"knee_stance": None, "knee_rmse": None, "knee_curve": ()}
     if len(knees):
         curve = knees.mean(axis=0)
         off = curve - band.curves()[0]
-        found = {"knee_stance": float(np.abs(knees).mean()), "knee_curve": tuple(curve.tolist()),
-                 "knee_rmse": float(np.sqrt(np.mean(off**2)))}  # fmt: skip
+        found |= {"knee_stance": float(np.abs(knees).mean()), "knee_curve": tuple(curve.tolist()),
+                  "knee_rmse": float(np.sqrt(np.mean(off**2)))}  # fmt: skip
     return GaitFigures(
         controller=name, speed=speed, starts=len(outcomes), falls=len(outcomes) - len(stood),
-        **means, **found, force_peak=mean_or_none([p for each in stances for p in each.peaks]),
+        **found, force_peak=mean_or_none([p for each in stances for p in each.peaks]),
         height_amplitude=mean_or_none([each.height_amplitude for each in stances]), tick=tick,
     )  # fmt: skip
 
