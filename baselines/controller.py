@@ -36,9 +36,8 @@ class Outputs(Block):
     soft_root: bool
     # (nv,) accelerations that the torques are to bring; (0,): not known
     vdot: np.ndarray = field(default_factory=no_numbers)
-    target: np.ndarray = field(
-        default_factory=no_numbers
-    )  # (nj,) q* of the servos [rad]; (0,): none
+    # (nj,) q* of the servos [rad]; (0,): there are none
+    target: np.ndarray = field(default_factory=no_numbers)
     stiffness: np.ndarray = field(default_factory=no_numbers)  # (nj,) K [N·m/rad]
     damping: np.ndarray = field(default_factory=no_numbers)  # (nj,) D [N·m·s/rad]
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from poise.baselines.balance.stepping.capture_step import CaptureStep
 from poise.baselines.balance.stepping.ipm_step import energy_foothold
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick
 from poise.baselines.balance.stepping.planning.swing import time_left
@@ -115,7 +116,9 @@ def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
     """A stepping controller's environment, and its tick but for the kernels that it calls."""
     env = ResidualStepEnv(duration=0.1)
     env.reset(seed=0)
-    return env, env.controller.blocks(env.simulation.state, env.targets)
+    controller = env.controller
+    assert isinstance(controller, CaptureStep)  # by default
+    return env, controller.blocks(env.simulation.state, env.targets)
 
 
 def contacts() -> None:

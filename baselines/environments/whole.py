@@ -126,6 +126,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
     def _begin_anew(self) -> None:
         """The controller's new trial; the failures of the episode's ticks stay counted."""
         controller = self.controller
+        assert isinstance(controller, CompiledController)  # by `_accept`
         failures = controller.failures
         controller.reset(self.state_source.state)
         controller.outputs().failures[0] = failures
