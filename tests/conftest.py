@@ -74,7 +74,7 @@ def pytest_collection_modifyitems(items):
     """Tests of what is above, which take longest, come first: the last ones, at which one process
     waits for another, are short.
     """
-    items.sort(key=lambda item: "training" not in item.path.relative_to(HERE).parts)
+    items.sort(key=lambda item: HERE / "training" not in item.path.parents)
 
 
 def pytest_collection_finish(session):

@@ -81,6 +81,7 @@ def test_sb3_loads_the_same_policy(name: str, request: pytest.FixtureRequest) ->
     np.testing.assert_allclose(policy.act(raw[:, :shown]), np.clip(expected, -1.0, 1.0), atol=1e-4)
 
 
+@pytest.mark.weekly
 def test_sb3_loads_them_where_there_is_no_poise() -> None:
     """In a process that cannot import Poise."""
     path = packaged_folder("policies") / "residual-step" / POLICY
