@@ -279,7 +279,7 @@ def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
 
 def test_a_search_for_a_walk(tmp_path, in_process):
     """It is told as pushes are, and goes on from its file."""
-    console, short = Console(record=True, width=200), {"commands": [{"ahead": 0.6}], "seconds": 3.0}
+    console, short = Console(record=True, width=200), {**WALKS, "commands": [{"ahead": 0.6}]}
     tune(walking(walks=short), tmp_path, workers=1, console=console)
     assert "half walk alone at 1.0" in console.export_text()
     found = tune(walking(walks=short, generations=2), tmp_path, workers=1, resume=True)
