@@ -7,6 +7,7 @@ import functools
 import gc
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -50,10 +51,14 @@ def can_render() -> None:
 
 @pytest.fixture
 def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Videos of which nobody says the rate have five frames a second: drawing takes its time."""
+    """Videos of which nobody says the rate have five frames a second, and strips three frames:
+    drawing takes its time.
+    """
     monkeypatch.setattr("poise.training.pictures.figures.video.RATE", 5.0)
+    monkeypatch.setattr("poise.training.pictures.report.worst_trials.FRAMES", 3)
 
 
+HERE = Path(__file__).parent
 #: parts of `environments/kernels.py`, in such an order that two processes have as much to do
 KERNELS = ("planner", "contacts", "walking", "sensing", "whole", "performing", "rows")
 
@@ -63,6 +68,13 @@ def pytest_sessionstart(session):
     from poise.baselines.warmup import prepare
 
     prepare(*KERNELS)  # once, and not in each of xdist's processes
+
+
+def pytest_collection_modifyitems(items):
+    """Tests of what is above, which take longest, come first: the last ones, at which one process
+    waits for another, are short.
+    """
+    items.sort(key=lambda item: HERE / "training" not in item.path.parents)
 
 
 def pytest_collection_finish(session):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "examples/notebooks").glob("*.ipynb"))
-LONG = {"own_policy", "read_result"}  # half a minute of a processor: weekly
+LONG = {"own_controller", "own_policy", "read_result"}  # much of a processor's time: weekly
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def config(start: Path | None, action: str = "whole", **changes: Any) -> TrainCo
 
 def imported(chosen: TrainConfig) -> tuple[Any, Any]:
     """The model whose actor is the policy, and the environments."""
-    normalize = _training_envs(chosen)
+    normalize = _training_envs(chosen, robot())
     model, start = make_model(chosen, normalize), first_policy(chosen.start_from)
     import_policy(start, chosen.make_env(robot()), model, normalize)
     return model, normalize
@@ -170,7 +170,7 @@ def test_a_run_starts_from_it(tmp_path: Path) -> None:
 def test_a_slow_actor_moves_by_its_share() -> None:
     """A step of the optimizer moves the actor by a tenth of Adam's first, the critic by all."""
     chosen = config(None)
-    model = make_model(chosen, _training_envs(chosen))
+    model = make_model(chosen, _training_envs(chosen, robot()))
     before = {name: p.detach().clone() for name, p in model.policy.named_parameters()}
     for parameter in model.policy.parameters():
         parameter.grad = parameter.detach() * 0.0 + 1.0

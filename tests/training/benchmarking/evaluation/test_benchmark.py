@@ -217,6 +217,7 @@ def test_a_stopped_benchmark_ends_as_if_it_had_not_been(
     assert (out / "trials.csv").read_bytes() == (finished / "trials.csv").read_bytes()
 
 
+@pytest.mark.usefixtures("few_frames")
 def test_a_controller_that_raises_costs_its_trial_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

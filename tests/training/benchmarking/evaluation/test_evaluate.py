@@ -41,6 +41,7 @@ def lines(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.weekly
 def test_results_do_not_depend_on_the_number_of_workers(
     tmp_path: Path, in_process: type[InProcess], monkeypatch: pytest.MonkeyPatch
 ) -> None:

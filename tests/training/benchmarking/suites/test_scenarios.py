@@ -91,11 +91,11 @@ def test_who_does_not_walk_plays_the_others() -> None:
 def test_a_result_is_the_same_in_any_order_and_is_played_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By this process, in reverse, and by two others: the same bytes. A trial ends when it says."""
+    """By this process, in reverse, and by another: the same bytes. A trial ends when it says."""
     suite = tmp_path / "suite.yaml"
     suite.write_text(yaml.safe_dump(SUITE, sort_keys=False))
     names = ("momentum-qp", "walk")
-    summary = evaluate(names, suite, out=tmp_path / "a", seed=4, workers=2)
+    summary = evaluate(names, suite, out=tmp_path / "a", seed=4, workers=1)
     monkeypatch.setattr("poise.training.benchmarking.evaluation.run.Executor", InProcess)
     evaluate(names, suite, out=tmp_path / "b", seed=4)
     tables = [(tmp_path / each / "trials.csv").read_bytes() for each in "ab"]

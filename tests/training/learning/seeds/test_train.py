@@ -51,10 +51,10 @@ def same(a: Path, b: Path) -> bool:
 
 
 def test_runs_are_those_of_single_seeds(tmp_path: Path) -> None:
-    """From two processes: the bits of `train` with each seed alone, and what seeds.json says."""
+    """From another process: the bits of `train` with each seed alone, and what seeds.json says."""
     text = io.StringIO()
     config = tiny_config(threads=2)
-    train_seeds(config, [0, 3], tmp_path / "out", workers=2, console=Console(file=text, width=140))
+    train_seeds(config, [0, 3], tmp_path / "out", workers=1, console=Console(file=text, width=140))
     train(tiny_config(seed=3), tmp_path / "three", progress=False)
     assert same(tmp_path / "out/seed-0", finished_run())
     assert same(tmp_path / "out/seed-3", tmp_path / "three")

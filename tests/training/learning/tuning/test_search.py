@@ -91,8 +91,13 @@ def test_limits_follow_what_is_recovered():
 
 
 @pytest.mark.parametrize("name", packaged("tuning"))
-def test_packaged_ranges(name):
-    """All are numbers of the controller, and hold where the search starts from."""
+def test_packaged_ranges(name, monkeypatch):
+    """All are numbers of the controller, and hold where the search starts from.
+
+    A configuration refuses a number that is out of range, before a controller is made of it.
+    """
+    made = "poise.training.learning.tuning.gains.load_controller"
+    monkeypatch.setattr(made, lambda data, _: controller_config(data))
     config = tune_config(name)
     with allowed(network(config.controller)) if config.controller in KNOWN else nullcontext():
         gains = Gains(config.controller, config.gains, config.robot)
@@ -275,12 +280,12 @@ def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
     assert of(0.5, step_time=4.9) == 0.0
 
 
-def test_a_search_for_a_walk(tmp_path):
+def test_a_search_for_a_walk(tmp_path, in_process):
     """It is told as pushes are, and goes on from its file."""
-    console = Console(record=True, width=200)
-    tune(walking(), tmp_path, workers=1, console=console)
+    console, short = Console(record=True, width=200), {**WALKS, "commands": [{"ahead": 0.6}]}
+    tune(walking(walks=short), tmp_path, workers=1, console=console)
     assert "half walk alone at 1.0" in console.export_text()
-    found = tune(walking(generations=2), tmp_path, workers=1, resume=True)
+    found = tune(walking(walks=short, generations=2), tmp_path, workers=1, resume=True)
     assert found["gait"]["height"] != to_dict(controller_config("walk"))["gait"]["height"]
     stands = {"controller": "momentum-qp", "gains": {"com.weight": [1, 2]}}
     fast = {"walks": {"commands": [{"ahead": 9.0}]}}

@@ -122,9 +122,9 @@ def test_a_faster_motion_has_its_rates_and_the_impatient_stop_at_a_fall() -> Non
 
 
 def test_a_turn_is_performed() -> None:
-    """Half a turn on the spot, from three starts, without a fall and without the planner."""
+    """Half a turn on the spot, without a fall and without the planner."""
     robot = robot_named("humanoid")
     motion = reference_from(retarget(make("turn-in-place")[0], robot).clip, robot, "turn")
-    trials = follow(motion, "motion-step", robot=robot, starts=3)
-    assert not any(trial.fallen or trial.interruptions for trial in trials)
-    assert max(trial.placement_error for trial in trials) < 0.03
+    (trial,) = follow(motion, "motion-step", robot=robot, starts=1)
+    assert not trial.fallen and not trial.interruptions
+    assert trial.placement_error < 0.03

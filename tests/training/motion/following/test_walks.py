@@ -112,9 +112,8 @@ def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
     assert other.walker == "walk" and other.tempo < tempo
     made = retarget_clip(clip, robot)
     assert made.walker == walker and made.clip.commands is not None
-    trials = follow(reference_from(made.clip, robot, "run-curve"), walker, starts=2)
-    assert not any(trial.fallen for trial in trials)
-    assert all(0.8 < trial.walked < 1.1 and 0.9 < trial.turned < 1.2 for trial in trials)
+    (trial,) = follow(reference_from(made.clip, robot, "run-curve"), walker, starts=1)
+    assert not trial.fallen and 0.8 < trial.walked < 1.1 and 0.9 < trial.turned < 1.2
 
 
 def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
@@ -142,23 +141,22 @@ def test_a_slow_run_is_walked_without_a_fall(speed: float, walker: str) -> None:
     assert 0.7 < made.tempo <= 1.0 and made.clip.commands is not None
     assert made.walker == walker
     reference = reference_from(made.clip, robot_named(HUMANOID), "run")
-    trials = follow(reference, walker, starts=3)
-    assert not any(trial.fallen for trial in trials)
-    assert all(trial.walked > 0.8 for trial in trials)
+    (trial,) = follow(reference, walker, starts=1)
+    assert not trial.fallen and trial.walked > 0.8
 
 
 @pytest.mark.parametrize("name", ["circle", "turn-in-place", "backwards"])
 def test_walks_and_turns_are_performed(name: str, tmp_path: Path) -> None:
-    """As far as the clip goes, and as far round, from disturbed starts without a fall."""
+    """As far as the clip goes, and as far round, from a disturbed start without a fall."""
     clip = walking(name)
     write_robot_clip(clip, tmp_path / "clip.npz")
     again = read_robot_clip(tmp_path / "clip.npz")
     assert again.commands == pytest.approx(clip.commands)
-    trials = follow(tmp_path / "clip.npz", "walk", starts=3)
-    assert not any(trial.fallen for trial in trials)
-    shares = np.array([(trial.walked, trial.turned) for trial in trials])
+    (trial,) = follow(tmp_path / "clip.npz", "walk", starts=1)
+    assert not trial.fallen
+    shares = np.array([trial.walked, trial.turned])
     ahead, _, turn = SPEEDS[name]
-    assert np.isfinite(shares[0]).tolist() == [ahead != 0, turn != 0]
+    assert np.isfinite(shares).tolist() == [ahead != 0, turn != 0]
     assert shares[np.isfinite(shares)] == pytest.approx(1.0, abs=0.2)
 
 

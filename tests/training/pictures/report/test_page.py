@@ -46,6 +46,11 @@ class Page(HTMLParser):
         return {name: base64.b64decode(text).decode() for name, text in texts.items()}
 
 
+@pytest.fixture(autouse=True)
+def _few(few_frames: None) -> None:
+    """Strips are short."""
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """The report of a small evaluation, without pictures where nothing can be drawn."""
