@@ -17,7 +17,6 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
 from poise.training.cli.entry import main
 from poise.training.deploy.robot_check import check as module
-from poise.training.deploy.robot_check import picture as picture_module
 from poise.training.deploy.robot_check.check import RobotCheck, check_robot
 from poise.training.deploy.robot_check.tables import print_check
 from poise.training.deploy.robot_check.uses import IN_PLACE, STEPPING, Uses
@@ -187,11 +186,9 @@ def test_the_table_says_it(check: RobotCheck) -> None:
 
 
 def test_the_command_writes_figures_and_a_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-    can_render: None,
-) -> None:  # fmt: skip
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], can_render: None
+) -> None:
     """JSON that strict readers take, and a PNG in which something is drawn."""
-    monkeypatch.setattr(picture_module, "SIZE", (105, 155))  # drawing takes its time
     path = write_urdf(tmp_path, armature={"*": 0.01})
     out, picture = tmp_path / "a/b.json", tmp_path / "biped.png"
     assert main(["robot", str(path), "--out", str(out), "--picture", str(picture)]) == 0
