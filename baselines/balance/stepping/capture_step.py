@@ -54,7 +54,10 @@ def check_qps(
             )
         for task, gains in qp.tasks.items():
             if gains.kernel is None:
-                raise ConfigError("has no kernel", field=f"{name}.tasks.{task}")
+                raise ConfigError(
+                    "has no kernel, without which a controller cannot step",
+                    field=f"{name}.tasks.{task}",
+                )
 
 
 def allocate_step_memory(region: CopRegion) -> StepMemory:
