@@ -18,8 +18,7 @@ from poise.envs.robots.robot import Robot
 
 COMMAND_ENTRIES = 8  # of `BaseController.orders`
 
-
-no_numbers = partial(guarded_zeros, 0)
+_no_numbers = partial(guarded_zeros, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +34,11 @@ class Outputs(Block):
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
     soft_root: bool
     # (nv,) accelerations that the torques are to bring; (0,): not known
-    vdot: np.ndarray = field(default_factory=no_numbers)
+    vdot: np.ndarray = field(default_factory=_no_numbers)
     # (nj,) q* of the servos [rad]; (0,): there are none
-    target: np.ndarray = field(default_factory=no_numbers)
-    stiffness: np.ndarray = field(default_factory=no_numbers)  # (nj,) K [N·m/rad]
-    damping: np.ndarray = field(default_factory=no_numbers)  # (nj,) D [N·m·s/rad]
+    target: np.ndarray = field(default_factory=_no_numbers)
+    stiffness: np.ndarray = field(default_factory=_no_numbers)  # (nj,) K [N·m/rad]
+    damping: np.ndarray = field(default_factory=_no_numbers)  # (nj,) D [N·m·s/rad]
 
 
 @dataclass(frozen=True, eq=False)

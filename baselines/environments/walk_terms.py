@@ -9,7 +9,7 @@ from poise.baselines.balance.stepping.planning.blocks import StepMemory
 from poise.baselines.walking.planner.blocks import Gait
 from poise.baselines.walking.planner.step import step_time
 from poise.envs.balance.mdp.observation import GROUND, Terms, View
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, Integer
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along
 from poise.envs.physics.kinematics import StateArrays
@@ -27,12 +27,9 @@ class Strides(Block):
 
     when: Annotated[np.ndarray, 3]  # times of the lift-offs, the latest first [s]
     where: Annotated[np.ndarray, 3, 3]  # the CoM along the ground [m] and the heading [rad] then
-    count: Annotated[np.ndarray, 1, np.int64]  # lift-offs since the walk began
-    # steps begun since the reset, when this was looked at last
-    steps: Annotated[np.ndarray, 1, np.int64]
-    error: Annotated[
-        np.ndarray, 3
-    ]  # mean velocity less the command: ahead, left [m/s], turn [rad/s]
+    count: Integer  # lift-offs since the walk began
+    steps: Integer  # steps begun since the reset, when this was looked at last
+    error: Annotated[np.ndarray, 3]  # mean velocity less the command: ahead, left [m/s], turn
 
     def clear(self) -> None:
         """Forget the walk."""

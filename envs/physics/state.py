@@ -25,6 +25,9 @@ class ArrayView:
         view.flags.writeable = False
         return view
 
+    def __set__(self, state: "RobotState", value: object) -> None:
+        raise AttributeError(f"{self.name} of a state is read-only")
+
 
 class RobotState(Copyable):
     """Every kinematic and centroidal quantity of one tick; read-only views, world axes.

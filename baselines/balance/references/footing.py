@@ -15,8 +15,8 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.maths.vectors import rotation_vector
 from poise.envs.robots.robot import Robot
+from poise.envs.robots.soles import sole_pose
 
-from .postures import sole_pose
 from .splines import evaluate, piecewise, rest_spline
 
 #: columns of `Footing.coeffs`: c, φ, place and turn of either sole, then δ

@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 from poise.envs.compiled.maths.polygons import clipped
 from poise.envs.physics.legs import standing_data
 from poise.envs.robots.robot import Robot
+from poise.envs.robots.soles import sole_pose
 
-from .postures import LevelKinematics, sole_pose
+from .postures import LevelKinematics
 
 MOST, CLOSE = 15, 1e-7  # iterations, and the error [m, rad] that ends them
 FURTHEST = 0.3  # [m, rad] of a step

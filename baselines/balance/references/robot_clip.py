@@ -15,9 +15,10 @@ from poise.configs.files import write_atomic
 from poise.configs.reading import parse_json, parsing
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot
+from poise.envs.robots.soles import sole_pose
 
 from .footing import check_planted, make_footing, sole_poses
-from .postures import LevelKinematics, most_beyond, sole_pose
+from .postures import LevelKinematics, most_beyond
 from .reference_motion import ReferenceMotion, check_commands, whole_walk
 from .splines import piecewise, rest_spline
 

@@ -18,10 +18,10 @@ import mujoco
 import numpy as np
 from scipy.optimize import linprog
 
-from poise.baselines.balance.references.postures import sole_pose
 from poise.envs.physics.arrays import dof_chain
 from poise.envs.physics.legs import standing_data
 from poise.envs.robots.robot import Robot
+from poise.envs.robots.soles import sole_pose
 
 from .config import StepLimits, SwingTask
 
@@ -92,7 +92,10 @@ def highest_lift(robot: Robot) -> float:
     its joints' ranges, to 1 mm [m]."""
 
     def possible(height: float) -> bool:
-        ways = [_lift(robot, sole, height, level=False) for sole in range(len(robot.soles))]
+        ways = (
+            _lift(robot, standing_data(robot), sole, height, level=False)
+            for sole in range(len(robot.soles))
+        )
         return all(way is not None for way in ways)
 
     return highest(possible, robot.height_com)
@@ -117,9 +120,9 @@ def _leg_dofs(robot: Robot, sole: int) -> np.ndarray:
 
 
 def _foot_speed(robot: Robot, sole: int, clearance: float, share: float) -> SwingSpeed:
-    """The speeds of one foot."""
-    way = _lift(robot, sole, clearance, level=True)
+    """The speeds of one foot, where the leg has lifted it as high as it can of `clearance`."""
     data, dofs = standing_data(robot), _leg_dofs(robot, sole)
+    way = _lift(robot, data, sole, clearance, level=True)
     fastest = _joint_speeds(robot, data, dofs, share) / PEAK
     rows = _jacobian(robot, data, sole, dofs)
     lift = np.inf
@@ -141,12 +144,15 @@ def _joint_speeds(robot: Robot, data: mujoco.MjData, dofs: np.ndarray, share: fl
         return np.where(left > 0.0, left / model.dof_damping[dofs], 0.0)
 
 
-def _lift(robot: Robot, sole: int, clearance: float, level: bool) -> np.ndarray | None:
+def _lift(
+    robot: Robot, data: mujoco.MjData, sole: int, clearance: float, level: bool
+) -> np.ndarray | None:
     """(n,) the way of the leg's joints that lifts the sole by `clearance`; None if none is found.
 
-    It stays `level`, whatever the joints' ranges, or they keep to these, whatever it turns.
+    It stays `level`, whatever the joints' ranges, or they keep to these, whatever it turns. The
+    posture of `data` goes that way.
     """
-    model, data, dofs = robot.model, standing_data(robot), _leg_dofs(robot, sole)
+    model, dofs = robot.model, _leg_dofs(robot, sole)
     low, high = robot.joint_range[dofs - 6].T
     start = data.qpos[dofs + 1].copy()
     goal = sole_pose(data, robot.soles[sole])[0] + [0.0, 0.0, clearance]

@@ -98,7 +98,7 @@ def test_a_push_that_feet_in_place_recover_from(name: str) -> None:
 def test_a_recovery_with_steps(name: str) -> None:
     env = same_bits(partial(load_agent, name, robot()), HARD, 120)
     stepper = env.controller
-    assert stepper.stepped and env.simulation.state.com[2] > 0.8 * env.robot.height_com
+    assert stepper.steps and env.simulation.state.com[2] > 0.8 * env.robot.height_com
 
 
 def with_action(env: BalanceEnv, entries: float = 0.0, **last: float) -> Agent:

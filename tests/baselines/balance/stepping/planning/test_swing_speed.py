@@ -46,6 +46,13 @@ def test_speeds_go_with_the_damping() -> None:
     assert swing_speed(damped(0.0), CLEARANCE) == (np.inf, np.inf, np.inf)
 
 
+def test_speeds_are_those_of_the_lifted_leg() -> None:
+    """The higher the foot, the more the knee is bent, and the shorter is its lever ahead."""
+    body = robot("humanoid")
+    ahead = [swing_speed(body, share * body.height_com).ahead for share in (0.001, 0.1, 0.2)]
+    assert ahead[0] > 1.2 * ahead[1] > 1.4 * ahead[2]
+
+
 def test_no_joint_moves_faster_than_its_motor_can_drive_it() -> None:
     """The foot is no faster than joints at the bound |q̇| D = τ_max would all together move it."""
     r = damped(1.0)
