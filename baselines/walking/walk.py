@@ -9,8 +9,9 @@ import numpy as np
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick, Search, StepGains
 from poise.baselines.balance.stepping.planning.config import StepLimits
-from poise.baselines.balance.stepping.planning.swing import Swing, bind_swings
+from poise.baselines.balance.stepping.planning.swing import Swing
 from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
+from poise.baselines.balance.stepping.planning.swing_task import bind_swings
 from poise.baselines.balance.stepping.planning.units import in_si
 from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.stepping.planning.swing import swing_gains, swing_task
+from poise.baselines.balance.stepping.planning.swing_task import swing_gains, swing_task
 from poise.baselines.whole_body.tasks.task import RowArrays, Rows, TaskTick
 from poise.envs.compiled.memory import guarded_zeros
 

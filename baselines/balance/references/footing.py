@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.maths.runs import runs_of
 from poise.envs.compiled.maths.vectors import rotation_vector
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
@@ -197,8 +198,7 @@ def unwound(turns: np.ndarray) -> np.ndarray:
 
 def stances_of(down: np.ndarray) -> list[tuple[int, int]]:
     """First and last frame of every time that a sole is planted."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], down.astype(int), [0]])))
-    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+    return [(first, after - 1) for first, after in runs_of(down).tolist()]
 
 
 def _check_falls(

@@ -28,8 +28,9 @@ from .planning.cop_region import CopRegion, cop_region, rest_ahead
 from .planning.feedback import feedback_arrays
 from .planning.recentring import recentring_arrays, stop_recentring
 from .planning.search import capture_foothold, make_search
-from .planning.swing import Swing, bind_swings, swing_at, time_left
+from .planning.swing import Swing, swing_at, time_left
 from .planning.swing_speed import possible_limits
+from .planning.swing_task import bind_swings
 from .planning.units import in_si
 from .tick import capture_tick
 

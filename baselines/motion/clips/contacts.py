@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from poise.envs.compiled.maths.runs import runs_of
+
 from .clip import Clip
 from .skeleton import SIDES
 
@@ -81,10 +83,10 @@ def measure_contacts(clip: Clip) -> Contacts:
 
 def longest_flight(planted: np.ndarray, dt: float) -> tuple[int, float]:
     """First frame and duration [s] of the longest time without a planted foot; 0 s without any."""
-    free = np.flatnonzero(~planted.any(axis=1))
-    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
-    longest = max(runs, key=len)
-    return int(longest[0]) if len(longest) else 0, len(longest) * dt
+    in_air = np.asarray(~planted.any(axis=1))
+    flights = [(after - first, first) for first, after in runs_of(in_air).tolist()]
+    frames, first = max(flights, key=lambda flight: flight[0], default=(0, 0))
+    return first, frames * dt
 
 
 def over_ground(clip: Clip) -> Clip:

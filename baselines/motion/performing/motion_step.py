@@ -9,7 +9,7 @@ from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.tempo import Pace
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick
-from poise.baselines.balance.stepping.planning.swing import bind_swings
+from poise.baselines.balance.stepping.planning.swing_task import bind_swings
 from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets

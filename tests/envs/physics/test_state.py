@@ -145,7 +145,7 @@ def test_a_state_is_read_only_and_a_copy_stays():
     with pytest.raises(ValueError, match="read-only"):
         state.com[0] = 1.0
     with pytest.raises(AttributeError, match="com of a state is read-only"):
-        state.com = kept.com  # type: ignore[misc]
+        state.com = kept.com
     before = kept.com.copy()
     simulation.step(np.zeros(simulation.model.nu), 20)
     np.testing.assert_array_equal(kept.com, before)

@@ -33,7 +33,7 @@ class CourseRecord:
     """
 
     def __init__(self) -> None:
-        self._rows: list[tuple[Any, ...]] = []  # one for each field of `Course`
+        self._rows: list[dict[str, Any]] = []  # of the fields of `Course`
         self._steps: SteppingController | None = None
 
     def __call__(self, env: BalanceEnv) -> None:
@@ -48,15 +48,17 @@ class CourseRecord:
             step = self._steps.stepping()
             if (foot := step.foot) >= 0:
                 foothold = tuple(step.foothold)
-        self._rows.append((
-            env.simulation.time, np.abs(env.simulation.views.ctrl) / self._limit,
-            s.capture_point.copy(), s.support[: s.support_size[0]].copy(), s.contacts > 0.5,
-            s.sole_point[:, :2].copy(), foothold, foot, float(env.episode.metrics[FAILURES]),
-        ))  # fmt: skip
+        self._rows.append({
+            "time": env.simulation.time, "load": np.abs(env.simulation.views.ctrl) / self._limit,
+            "capture_point": s.capture_point.copy(),
+            "supports": s.support[: s.support_size[0]].copy(), "contacts": s.contacts > 0.5,
+            "soles": s.sole_point[:, :2].copy(), "foothold": foothold, "swinging": foot,
+            "failures": float(env.episode.metrics[FAILURES]),
+        })  # fmt: skip
 
     def course(self) -> Course:
         """What was kept, as arrays."""
-        columns = dict(zip(Course.__dataclass_fields__, zip(*self._rows, strict=True), strict=True))
-        supports = list(columns.pop("supports"))
+        columns = {name: [row[name] for row in self._rows] for name in Course.__dataclass_fields__}
+        supports = columns.pop("supports")
         arrays = {name: np.array(column) for name, column in columns.items()}
         return Course(supports=supports, **arrays)

@@ -1,6 +1,7 @@
 """The leaderboard pages, generated from committed files summary.json."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -103,15 +104,9 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     stays that of the first.
     """
     (first, summary), *later = summaries.items()
-    sampled = [{angle for angle, _ in each["robot"]["ankle_limit"]} for each in summaries.values()]
-    common = set.intersection(*sampled)  # [deg]: later results have the limit's corners, too
-
-    def shared(of: Summary) -> dict[str, object]:
-        limit = [row for row in of["robot"]["ankle_limit"] if row[0] in common]
-        alike = {**of, "robot": {**of["robot"], "ankle_limit": limit}}
-        return {key: alike[key] for key in SAME}
-
-    check_alike(summaries, shared)
+    for source, other in later:
+        common = _angles(summary) & _angles(other)  # later results have the limit's corners, too
+        check_alike({first: summary, source: other}, partial(_shared, common))
     reference = summary["reference"]
     entries, origin = dict(summary["controllers"]), dict.fromkeys(summary["controllers"], first)
     pairs = {pair["b"]: pair for pair in summary["pairs"] if pair["a"] == reference}
@@ -131,6 +126,18 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     whole: Summary = {**summary, "controllers": entries, "pairs": list(pairs.values()),
                       "ranking": ranked(entries)}  # fmt: skip
     return whole, origin
+
+
+def _angles(summary: Summary) -> set[float]:
+    """Directions in which the ankle limit is told [deg]."""
+    return {angle for angle, _ in summary["robot"]["ankle_limit"]}
+
+
+def _shared(angles: set[float], summary: Summary) -> dict[str, object]:
+    """What results of one page have in common; of the ankle limit that at these `angles`."""
+    limit = [row for row in summary["robot"]["ankle_limit"] if row[0] in angles]
+    alike = {**summary, "robot": {**summary["robot"], "ankle_limit": limit}}
+    return {key: alike[key] for key in SAME}
 
 
 def _shape(entry: Entry) -> tuple[list[float], list[int]]:

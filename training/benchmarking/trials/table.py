@@ -31,6 +31,7 @@ OUTCOME_COLUMNS = tuple(
 COLUMNS = (*CASE_COLUMNS, *OUTCOME_COLUMNS)
 TEXTS = ("controller", "part", "factor", "level", "body", "profile", "realism", "motion")
 WHOLE = ("trial", "seed", "stage")
+FULL = (*WHOLE, "delay", "mass_error")  # columns without empty cells
 AS_JSON = ("later", "commands", "kicks", "terrain")  # of all other columns a cell is a number
 
 
@@ -73,9 +74,12 @@ def _push_cells(push: Push | None) -> dict[str, Cell]:
 
 
 def read_trial(line: Mapping[str, str], path: Path) -> Trial:
-    """The trial of a line; raises ConfigError where it does not parse. An empty cell, and a column
-    that older results lack, is a field's default."""
+    """The trial of a line; raises ConfigError where it does not parse. A column that older results
+    lack is a field's default, and so is an empty cell, but for those of `FULL` and of a push."""
     try:
+        for name in (*FULL, *(PUSH_COLUMNS if line["body"] else ())):
+            if not line[name]:
+                raise ValueError(f"{name} is empty")
         cells = {name: _read(name, line[name]) for name in CASE_COLUMNS if line.get(name)}
         push = {name: cells.pop(name) for name in PUSH_COLUMNS if name in cells}
         if push:
@@ -86,7 +90,8 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
     cells["number"] = cells.pop("trial", None)
     cells.pop("controller", None)
-    return build(Trial, {"pushes": pushes, "conditions": conditions, **cells}, path)
+    source = f"{path}: trial {line['trial']}"
+    return build(Trial, {"pushes": pushes, "conditions": conditions, **cells}, source)
 
 
 def _read(column: str, text: str) -> Any:

@@ -80,6 +80,7 @@ class StandaloneController(OutsideController):
 
     On the same readings, with `ground_wrench`, the torques are bit for bit those of `poise
     evaluate`; without it they are for as long as nothing but the ground pushes the robot.
+    Attributes are those of `OutsideController`.
     """
 
     def __init__(self, agent: Agent):

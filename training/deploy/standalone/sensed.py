@@ -119,7 +119,7 @@ class SensedController(OutsideController):
 
     Call `reset` once, and then `command` every `period` seconds with what was measured since.
 
-    Attributes:
+    Attributes (and those of `OutsideController`):
         sensor_period: seconds between two measurements.
         measurements: that `command` takes, `period` over `sensor_period`.
     """

@@ -134,7 +134,7 @@ def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]
     for name in results.controllers:
         own = [record for record in results.of(name) if record.part == part]
         shares = np.array([record.impulse / limits[record.direction]
-                           if record.direction in limits else record.fraction for record in own],
+                           if limits.get(record.direction) else record.fraction for record in own],
                           dtype=float)  # fmt: skip
         known = np.isfinite(shares)
         trials[name] = shares[known], np.array([record.recovered for record in own])[known]

@@ -102,6 +102,9 @@ def test_a_line_of_trials_csv_holds_all_pushes(limits: PushLimits, tmp_path: Pat
     assert len(json.loads(line["later"])) == len(trial.pushes) - 1
     text = {key: "" if value is None else str(value) for key, value in line.items()}
     assert read_trial(text, tmp_path) == trial
+    for name in ("stage", "delay", "elevation", "profile"):  # a damaged file is another trial
+        with pytest.raises(ConfigError, match=f"trial 0 does not parse: {name} is empty"):
+            read_trial({**text, name: ""}, tmp_path)
 
 
 def test_touchdowns_count_feet_that_were_in_the_air() -> None:
