@@ -12,7 +12,8 @@ from poise.training.pictures.sessions.loading import load_live
 from poise.training.pictures.sessions.recorded import recorded_trial
 from poise.training.pictures.sessions.spec import MOST, STANDING, SessionSpec, Spec, TrialSpec
 
-from .server import Visits, check_installed, check_port, greeting, serving, until_ctrl_c
+from .origins import Visits
+from .server import check_installed, check_port, greeting, serving, until_ctrl_c
 
 DEFAULT = "feedback-step"
 

@@ -38,7 +38,8 @@ from poise.training.pictures.sessions.session import Session, load_session
 from poise.training.pictures.sessions.spec import SessionSpec, Spec
 from poise.training.pictures.view import browser
 from poise.training.pictures.view.browser import BrowserView
-from poise.training.pictures.view.server import Visits, check_port, greeting, serving
+from poise.training.pictures.view.origins import Visits
+from poise.training.pictures.view.server import check_port, greeting, serving
 from poise.training.pictures.view.stage import FIELD_OF_VIEW, LANE, Stage, first_view, ground_meshes
 from poise.training.pictures.view.walking import Throttle
 from tests.support.browser import CHROMIUM, Browser
