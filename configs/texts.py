@@ -34,6 +34,24 @@ def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "".join([first, "|" + "---|" * len(head) + "\n", *others])
 
 
+def markdown_page(package: str, template: str, **values: object) -> str:
+    """A page by a template in the folder `templates` of a package, which knows `plain` and `code`.
+
+    Nothing is escaped: what a stranger may have written passes one of these.
+    """
+    import jinja2  # when it is needed: most commands write no page
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(package, "templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"code": code, "plain": plain}
+    return environment.get_template(template).render(values)
+
+
 def printable(text: str) -> str:
     """The text for a terminal: what does not print, such as the beginning of a command to it, is
     shown as Python writes it. Lines and tabs stay."""

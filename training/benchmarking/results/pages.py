@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-import jinja2
-
 from poise.configs.errors import ConfigError
-from poise.configs.texts import code, markdown_table, plain
+from poise.configs.texts import code, markdown_page, markdown_table
 from poise.training.running.columns import NONE, Figure
 from poise.training.running.summary import Entry, Summary
 
@@ -13,16 +11,9 @@ Table = tuple[Sequence[str], list[list[str]]]  # headings and rows, as `markdown
 
 
 def page_of(template: str, **values: object) -> str:
-    """The Markdown of a template of this room: `table`, `code`, `plain` and `commit` are known."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("poise.training.benchmarking.results", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"code": code, "plain": plain, "commit": _commit}
-    return environment.get_template(template).render(table=markdown_table, code=code, **values)
+    """The Markdown of a template of this room, which knows `table`, `code` and `commit`, too."""
+    known = {"table": markdown_table, "code": code, "commit": _commit}
+    return markdown_page("poise.training.benchmarking.results", template, **known, **values)
 
 
 def check_alike(

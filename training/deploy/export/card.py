@@ -4,12 +4,11 @@ import html
 from collections.abc import Sequence
 from typing import Any
 
-import jinja2
 import yaml
 
 import poise
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.configs.texts import code, plain
+from poise.configs.texts import markdown_page
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.observation import observation_table
 from poise.training.learning.policy import Policy
@@ -53,7 +52,9 @@ def card(
         }
         head["model-index"] = [{"name": name, "results": [result]}]
     below = env.controller if isinstance(env, ResidualBalanceEnv) else None
-    page = _template().render(
+    page = markdown_page(
+        "poise.training.deploy.export",
+        "card.md.j2",
         name=name,
         robot=env.robot.name,
         timesteps=policy.state["timesteps"],
@@ -72,16 +73,3 @@ def card(
     )
     text = yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=1000)
     return f"---\n{text}---\n\n{page}"
-
-
-def _template() -> jinja2.Template:
-    """The page. Nothing is escaped: what a stranger may have written passes `plain` or `code`."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("poise.training.deploy.export", "templates"),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {"code": code, "plain": plain}
-    return environment.get_template("card.md")
