@@ -23,7 +23,7 @@ def curriculum_levels(config: TrainConfig) -> list[Realism]:
                           choices=error.choices) from None  # fmt: skip
 
 
-class CurriculumCallback(BaseCallback):
+class ScheduleCallback(BaseCallback):
     """Scales what grows or narrows as the run goes on: pushes, errors of the robot, exploration.
 
     The deterministic policy is what counts in the end: with little noise left (`log_std_final` of

@@ -31,7 +31,7 @@ from poise.training.running.stopping import keeps
 from .callbacks import Checkpoints, Progress, RolloutLog
 from .checkpoints import restore
 from .config import TrainConfig
-from .curriculum import CurriculumCallback, curriculum_levels
+from .curriculum import ScheduleCallback, curriculum_levels
 from .imported import import_policy
 from .policy import locate_policy
 from .policy_files import BEST, CONFIG, LAST, STATE, check_controller, find_checkpoint
@@ -107,7 +107,7 @@ def train(
         checkpoints = Checkpoints(config, robot, out, state)
         stack.callback(checkpoints.close)
         given = [callback] if isinstance(callback, BaseCallback) else list(callback)
-        callbacks = [RolloutLog(), CurriculumCallback(config), checkpoints, *given]
+        callbacks = [RolloutLog(), ScheduleCallback(config), checkpoints, *given]
         bar = Progress(config.steps)
         stack.callback(bar.close)
         if progress:

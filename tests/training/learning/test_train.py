@@ -328,13 +328,13 @@ def test_a_damaged_run_is_not_resumed(run, spoil):
 def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
     """The largest push starts small and reaches its size after its fraction of the run."""
     largest = []
-    start = curriculum.CurriculumCallback._on_rollout_start
+    start = curriculum.ScheduleCallback._on_rollout_start
 
     def spy(self):
         start(self)
         largest.append(self.training_env.get_attr("push_sampler")[0].magnitude)
 
-    monkeypatch.setattr(curriculum.CurriculumCallback, "_on_rollout_start", spy)
+    monkeypatch.setattr(curriculum.ScheduleCallback, "_on_rollout_start", spy)
     config = tiny_config(steps=256, curriculum=Curriculum(start=0.1, share=0.5))
     config = replace(config, evaluation=replace(config.evaluation, trials=1))
     train(config, tmp_path, progress=False)
@@ -357,14 +357,14 @@ def test_the_curriculum_grows_the_errors_of_the_robot(given, parts, tmp_path, mo
     Mixed, the environments of a run have levels from ideal to that one; with levels, these in turn.
     """
     noises = []
-    start = curriculum.CurriculumCallback._on_rollout_start
+    start = curriculum.ScheduleCallback._on_rollout_start
 
     def spy(self):
         start(self)
         levels = self.training_env.get_attr("realism")
         noises.append([level.sensors.gyro_noise for level in levels])
 
-    monkeypatch.setattr(curriculum.CurriculumCallback, "_on_rollout_start", spy)
+    monkeypatch.setattr(curriculum.ScheduleCallback, "_on_rollout_start", spy)
     config = tiny_config(steps=256, curriculum=Curriculum(realism=0.2, share=0.5, **given))
     config = replace(config, env=replace(config.env, realism=load_realism("field")))
     config = replace(config, evaluation=replace(config.evaluation, trials=1))

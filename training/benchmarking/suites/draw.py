@@ -3,18 +3,20 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self, TypeVar
+from typing import ClassVar, Self, TypedDict, TypeVar, Unpack
 
 import mujoco
 import numpy as np
 
+from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.balance.config import StartNoise
 from poise.envs.physics.pushes.options import check_body
-from poise.envs.physics.pushes.push import Push
+from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.physics.pushes.sampler import Range, push_bodies
 from poise.envs.sensing.realism import IDEAL
+from poise.envs.terrain.terrain import Terrain
 from poise.training.benchmarking.trials.push_limits import PushLimits
-from poise.training.benchmarking.trials.trial import Trial
+from poise.training.benchmarking.trials.trial import Conditions, Trial
 
 T = TypeVar("T")
 MOST_TRIALS = 100_000  # all are drawn before the first is played
@@ -35,6 +37,20 @@ class Standard:
     body: str | None = None  # the robot's first push body
     realism: str = field(default=IDEAL, metadata={"omit": "default"})  # a level or a file of one
     noise: StartNoise = field(default_factory=StartNoise)
+
+
+class Marks(TypedDict, total=False):
+    """Fields that say which place a trial has in its part, its conditions, and how it walks."""
+
+    stage: int
+    factor: str | None
+    level: str | None
+    conditions: Conditions
+    commands: tuple[TimedCommand, ...]
+    kicks: tuple[Kick, ...]
+    terrain: Terrain | None
+    motion: str | None
+    share: float | None
 
 
 class Draw:
@@ -68,12 +84,12 @@ class Draw:
         standard = self.standard
         return Push(self.bodies[0], standard.start, standard.push_duration, impulse, angle)
 
-    def trial(self, number: int, pushes: Iterable[Push] = (), **others: Any) -> Trial:
-        """A trial with its own seed and its first push over the limit; `others` are more fields."""
+    def trial(self, number: int, pushes: Iterable[Push] = (), **marks: Unpack[Marks]) -> Trial:
+        """A trial with its own seed and its first push over the limit."""
         pushes = tuple(pushes)
         fraction = self.limits.fraction(pushes[0]) if pushes else None
         seed = start_seed(self.seed, number)
-        return Trial(number, seed, pushes, limit_fraction=fraction, **others)
+        return Trial(number, seed, pushes, limit_fraction=fraction, **marks)
 
     def spread(
         self, number: int, ranges: Iterable[tuple[float, float, float, int]], stage: int
