@@ -115,6 +115,8 @@ def _print_replay(done: "Replay") -> None:
     from poise.training.benchmarking.diagnosis.words import push_told, why
 
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
+    if done.outcome.loss == "off command":
+        end = "upright, not as commanded"
     print(f"trial {done.trial.number}, {done.controller}: {end}")
     events: list[Push | Kick] = [*done.trial.pushes, *done.trial.kicks]
     events.sort(key=lambda each: each.start)

@@ -15,6 +15,7 @@ from .provenance import Circumstances
 from .trial_figures import (
     Bound,
     Counts,
+    Criterion,
     InMotion,
     Interval,
     MotionLevel,
@@ -163,11 +164,14 @@ class Loss(TypedDict):
 
 
 class Entry(Counts, EnvelopeFigures, Fractions, total=False):
-    """A controller. The counts are of the part that is rated, else of all trials. Of all are
-    `played`, `errors`, in which it raised, and `losses`, the most frequent cause first."""
+    """A controller. The counts are of the part that is rated, else of all trials, of pushed walks
+    of those that all controllers meet. Of all are `played`, `errors`, in which it raised, and
+    `losses`, the most frequent cause first. J50, the ranking, pairs and losses go by the
+    `criterion`; results of before it was written go by "recovered"."""
 
     played: Required[int]
     errors: Required[int]
+    criterion: Criterion
     losses: list[Loss]
     tick_us: Number
     fingerprint: str

@@ -106,7 +106,7 @@ class ProgressLines(Progress):
 
 def progress_bar(console: Console) -> Progress:
     """A bar, or lines, with trials, recovery rates (its field `rates`) and the time left."""
-    rates = TextColumn("recovered: {task.fields[rates]}", markup=False)
+    rates = TextColumn("not fallen, recovered: {task.fields[rates]}", markup=False)
     return _bar("trials", [MofNCompleteColumn(), rates], console)
 
 

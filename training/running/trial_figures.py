@@ -11,21 +11,31 @@ Interval = tuple[Number, Number]
 Bound = Literal["lower", "upper"] | None  # where a fit is only a bound
 
 
+#: what J50, rankings and pairs of a controller count: of walks that it has not fallen, of all else
+#: that it has recovered
+Criterion = Literal["not fallen", "recovered"]
+NOT_FALLEN: Criterion = "not fallen"
+RECOVERED: Criterion = "recovered"
+
+
 class Rate(TypedDict):
-    """The number of recovered trials, and their rate."""
+    """The number of recovered trials, and of those without a fall, and their rates.
+
+    Those without a fall or an error are not in older results of all parts.
+    """
 
     trials: int
     recovered: int
     recovered_rate: float
     recovered_ci95: Interval
+    fallen: NotRequired[int]
+    never_fell_rate: NotRequired[float]
+    never_fell_ci95: NotRequired[Interval]
 
 
 class Counts(Rate, total=False):
     """Counts of how trials ended, and medians of what was recorded."""
 
-    fallen: int
-    never_fell_rate: float
-    never_fell_ci95: Interval
     recovered_with_step: int
     recovered_in_place: int
     steps_mean: Number
@@ -51,6 +61,11 @@ class Counts(Rate, total=False):
 
 class WalkMeans(TypedDict, total=False):
     """Means over the trials of a level, see `Outcome`."""
+
+    own_speed_error: Number
+    own_turn_error: Number
+    last_speed_error: Number
+    last_turn_error: Number
 
     speed_ahead: Number
     speed_left: Number
@@ -87,9 +102,6 @@ class WalkLevel(Rate, StepsAsTold, WalkMeans, total=False):
 
     part: str
     level: str
-    fallen: int
-    never_fell_rate: float
-    never_fell_ci95: Interval
     minutes: float
     falls_per_minute: Number
     falls_per_minute_ci95: Interval | None

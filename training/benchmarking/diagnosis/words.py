@@ -16,7 +16,7 @@ LOSSES = {
     "contact": "fell: {body} touched the ground",
     "diverged": "the simulation diverged",
     "not quiet": "stood at the end, but was not upright and at rest",
-    "off command": "did not walk on as commanded",
+    "off command": "stayed upright, but did not walk on as commanded again",
     "motion": "fell from the motion",
     "error": "the controller raised an error",
 }

@@ -41,7 +41,7 @@ from poise.training.benchmarking.trials.names import check_name
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit, curves, stepping_limits
 from poise.training.benchmarking.trials.table import trial_row
-from poise.training.benchmarking.trials.trial import Trial
+from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.learning.seeds.records import expand_seeds
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS, plain
@@ -236,7 +236,7 @@ class Run:
 
         rates = Rates(plan.names)
         for (name, _), outcome in folder.finished.items():
-            rates.add(name, outcome.recovered)
+            rates.add(name, outcome)
         with progress_bar(self.console) as bar, contextlib.ExitStack() as working:
             task = bar.add_task("", total=plan.count, completed=len(folder.finished), rates="")
             executor = None
@@ -244,7 +244,7 @@ class Run:
                 executor = executor or working.enter_context(self.executor)
                 for job, outcome in executor.each(play, jobs):
                     folder.append(job.controller, job.trial.number, outcome)
-                    rates.add(job.controller, outcome.recovered)
+                    rates.add(job.controller, outcome)
                     bar.update(task, completed=len(folder.finished), rates=str(rates))
 
 
@@ -257,21 +257,28 @@ def compared(
 
 
 class Rates:
-    """Recovered rates so far as text: of each controller, or of many taken together."""
+    """The rates of trials without a fall and of recovered ones so far as text: of each controller,
+    or of many taken together.
+
+    Of a walk, recovered is to have gone on as commanded.
+    """
 
     def __init__(self, names: Sequence[str]):
         self._together = len(names) > FEW
-        self._counts = {"" if self._together else name: [0, 0] for name in names}
+        self._counts = {"" if self._together else name: [0, 0, 0] for name in names}
 
-    def add(self, name: str, recovered: bool) -> None:
+    def add(self, name: str, outcome: Outcome) -> None:
         """Count a trial."""
-        count = self._counts.setdefault("" if self._together else name, [0, 0])
-        count[0] += recovered
-        count[1] += 1
+        count = self._counts.setdefault("" if self._together else name, [0, 0, 0])
+        for k, one in enumerate((outcome.upright, outcome.recovered, True)):
+            count[k] += one
 
     def __str__(self) -> str:
-        rates = ((name, won / trials) for name, (won, trials) in self._counts.items() if trials)
-        return "  ".join(f"{name} {rate:.0%}".lstrip() for name, rate in rates)
+        return "  ".join(
+            f"{name} {upright / trials:.0%}, {recovered / trials:.0%}".lstrip()
+            for name, (upright, recovered, trials) in self._counts.items()
+            if trials
+        )
 
 
 def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | None) -> None:

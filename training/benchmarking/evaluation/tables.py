@@ -13,6 +13,7 @@ from poise.baselines.allowance import allow_words
 from poise.training.benchmarking.diagnosis.words import told_losses
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
+    AS_COMMANDED,
     AT_REST,
     ETA_MEAN,
     ETA_WORST,
@@ -22,8 +23,8 @@ from poise.training.running.columns import (
     J50_MEAN,
     J50_WORST,
     LOST_WON,
-    NEVER_FELL,
     NONE,
+    NOT_FALLEN,
     P_VALUE,
     PAIRED,
     RECOVERED,
@@ -34,6 +35,7 @@ from poise.training.running.columns import (
 from poise.training.running.summary import Entry, Summary
 from poise.training.running.tables import figure_table
 from poise.training.running.terminal import BESIDE, in_parts
+from poise.training.running.trial_figures import NOT_FALLEN as CRITERION
 
 from .walk_tables import level_tables, motion_tables, scenario_tables, walk_tables
 
@@ -46,10 +48,17 @@ IN_PAIRS = (LOST_WON.heading, P_VALUE.heading)  # headings whose figures the tab
 def ranked(entries: Mapping[str, Entry]) -> list[str]:
     """Controllers, the best first: by mean J50, else by the fraction of the limit, else by rate.
 
-    Those that took a force from nowhere come last.
+    The rate is that of the trials without a fall where all walk, else that of recovered ones. Of
+    equal ones the one with more recovered trials is first. Those that took a force from nowhere
+    come last.
     """
     key = _measure(entries)[0]
-    return sorted(entries, key=lambda name: (assisted(entries[name]), -_value(entries[name], key)))
+
+    def order(name: str) -> tuple[bool, float, float]:
+        entry = entries[name]
+        return assisted(entry), -_value(entry, key), -entry["recovered_rate"]
+
+    return sorted(entries, key=order)
 
 
 def places(
@@ -77,7 +86,12 @@ def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
     for key, form in (("j50_mean", ".1f"), ("fraction50", ".2f")):
         if all(key in entry for entry in entries.values()):
             return key, form
-    return "recovered_rate", ".2f"
+    return ("never_fell_rate" if walked(entries) else "recovered_rate"), ".2f"
+
+
+def walked(entries: Mapping[str, Entry]) -> bool:
+    """Whether all are judged by falls, see `Entry.criterion`."""
+    return all(entry.get("criterion") == CRITERION for entry in entries.values())
 
 
 def _value(entry: Entry, key: str) -> float:
@@ -122,6 +136,11 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     if any(heading.startswith(HALF_AT.name) for heading in headings):
         notes.append(f"{HALF_AT.name}: half of the pushes that are this fraction of the "
                      f"{summary['scale']} are recovered; larger is better")  # fmt: skip
+    if walked(summary["controllers"]):
+        notes.append(f"J50, the order and pairs of walks are by falls; {NOT_FALLEN.name} is of the "
+                     f"pushes that all meet; {AS_COMMANDED.name}: the last two strides are as near "
+                     "to the command as the controller's own before the push, within 0.05 m/s and "
+                     "5 °/s")  # fmt: skip
     if STEPS_TAKEN.heading in headings:
         notes.append(f"{STEPS_TAKEN.heading}: of all trials, those that were lost too")
     of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
@@ -145,7 +164,7 @@ def print_lost(
     """The numbers of trials that each controller has lost, why, and how to look at one of them.
 
     Args:
-        lost: name → the numbers of the trials that it did not recover.
+        lost: name → the numbers of the trials that it did not recover, of walks those that fell.
         entries: of the summary.
         folder: of the result.
         console: where the lines are printed.
@@ -170,11 +189,15 @@ def table_cells(summary: Summary) -> dict[str, list[str]]:
     entries = [summary["controllers"][name] for name in summary["ranking"]]
     told = [{**summary["controllers"][name], **pairs.get(name, {})} for name in summary["ranking"]]
     of_mix = f" of the {summary['rated']}" if summary["rated"] else ""
+    recovered = replace(RECOVERED, name=f"{RECOVERED.name}{of_mix}")
+    rates = (recovered, NOT_FALLEN)
+    if walked(summary["controllers"]):
+        rates = (NOT_FALLEN, AS_COMMANDED)
     figures = (
         *(J50_WORST, ETA_MEAN, ETA_WORST),
         replace(HALF_AT, name=f"{HALF_AT.name}, of {summary['scale']}"),
-        replace(RECOVERED, name=f"{RECOVERED.name}{of_mix}"),
-        *(NEVER_FELL, LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
+        *rates,
+        *(LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
     )
     return {
         J50_MEAN.heading: [j50_mean_text(entry) for entry in entries],

@@ -29,12 +29,11 @@ MEAN = "mean of the motions"
 
 
 def walk_tables(summary: Summary) -> Iterator[Table]:
-    """Three of the levels of each controller, and one of J50 by phase; as far as there are any."""
+    """Four of the levels of each controller, and one of J50 by phase; as far as there are any."""
     entries = summary["controllers"]
     for name in summary["ranking"]:
         levels = entries[name].get("walks", [])
-        as_told = replace(FALLS[-1], ends="")  # there is no room for its interval
-        for figures in ((*FALLS[1:-1], as_told, *FOLLOWED), STEPS, COSTS):
+        for figures in (FALLS[1:], FOLLOWED, STEPS, COSTS):
             if shown := known(figures, levels):
                 rows = (([level["level"]], level) for level in levels)
                 yield figure_table(name, ["command"], shown, rows)

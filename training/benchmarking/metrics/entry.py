@@ -17,6 +17,7 @@ from poise.training.benchmarking.suites.scenarios import PART as SCENARIOS
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit
+from poise.training.benchmarking.trials.trial import won as is_won
 from poise.training.running.summary import (
     Direction,
     Entry,
@@ -26,7 +27,7 @@ from poise.training.running.summary import (
     RobotFigures,
     Sector,
 )
-from poise.training.running.trial_figures import ScenarioFigures
+from poise.training.running.trial_figures import NOT_FALLEN, RECOVERED, ScenarioFigures
 
 from .factors import eurobench_figures, factor_figures
 from .motions import in_motion, motion_levels
@@ -34,6 +35,7 @@ from .played import (
     DIRECTIONAL,
     Played,
     ankle_limits,
+    by_falls,
     cells,
     counts,
     fitted,
@@ -54,12 +56,13 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
     """All figures of one controller; `steps` is the limit of one that steps."""
     everything, played = played, once(played)
     entry: Entry = {
-        **counts([outcome for _, outcome in rated(played)]),
+        **counts(rated(played)),
+        "criterion": NOT_FALLEN if by_falls(rated(played)) else RECOVERED,
         "root_force_max": max((outcome.root_force or 0.0) for _, outcome in played),
         "played": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
-    if found := losses((outcome, outcome.steps) for _, outcome in played):
+    if found := losses((o, o.steps) for t, o in played if not is_won(t, o)):
         entry["losses"] = found
     if directional := part(played, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))
@@ -144,9 +147,9 @@ def _fractions(played: Played, limits: PushLimits) -> Fractions:
 def _scenarios(played: Played) -> list[ScenarioFigures]:
     """Of each scenario that a controller has played, in the order of the suite."""
     found: list[ScenarioFigures] = []
-    for name, outcomes in cells(played, lambda trial: str(trial.level)).items():
-        figures: ScenarioFigures = {"scenario": name, **counts(outcomes)}
-        if speeds := [o.speed_ahead for o in outcomes if o.speed_ahead is not None]:
+    for name, own in cells(played, lambda trial: str(trial.level)).items():
+        figures: ScenarioFigures = {"scenario": name, **counts(own)}
+        if speeds := [o.speed_ahead for _, o in own if o.speed_ahead is not None]:
             figures["speed_ahead"] = sum(speeds) / len(speeds)
         found.append(figures)
     return found
@@ -161,18 +164,21 @@ def _levels(played: Played, suite: Suite) -> list[RealismLevel]:
     found: list[RealismLevel] = []
     for level in (None, *suite.levels):
         every = named([name for name in suite.parts if name != "factors"], level)
-        counted = counts([outcome for _, outcome in named(RANDOM, level) or every])
+        counted = counts(named(RANDOM, level) or every)
         here: RealismLevel = {
             "level": Path(level or suite.realism).stem,
             "trials": counted["trials"],
             "recovered": counted["recovered"],
             "recovered_rate": counted["recovered_rate"],
             "recovered_ci95": counted["recovered_ci95"],
+            "fallen": counted["fallen"],
+            "never_fell_rate": counted["never_fell_rate"],
+            "never_fell_ci95": counted["never_fell_ci95"],
             "torque_variation_median": counted["torque_variation_median"],
             "energy_median": counted["energy_median"],
         }
         if quiet := named(["quiet"], level):
-            stood = [not outcome.fallen and outcome.error is None for _, outcome in quiet]
+            stood = [outcome.upright for _, outcome in quiet]
             here["stood"], here["unpushed"] = sum(stood), len(stood)
         if aimed := named(DIRECTIONAL, level):
             direction, impulse, _ = pushes(aimed)

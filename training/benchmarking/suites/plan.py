@@ -8,7 +8,7 @@ from typing import NamedTuple
 from poise.envs.sensing.drawn import check_limbs
 from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.push_limits import PushLimits
-from poise.training.benchmarking.trials.trial import Outcome, Trial
+from poise.training.benchmarking.trials.trial import Outcome, Trial, won
 
 from .draw import Draw, Part
 from .factors import standard_levels
@@ -111,7 +111,7 @@ class Plan:
         for key, part, level, first, number, shift in self._parts:
             recovered = {
                 name: [
-                    finished[name, trial.number].recovered
+                    won(trial, finished[name, trial.number])
                     for trial in first
                     if self.plays(name, trial)
                 ]

@@ -15,12 +15,12 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Kick, Push
-from poise.training.benchmarking.diagnosis.diagnosis import diagnose
+from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis, diagnose
 from poise.training.benchmarking.diagnosis.record import CourseRecord
 from poise.training.motion.tracking.record import Tracking
 
 from .agents import Agent
-from .gait_figures import AIR_TIME, Walk
+from .gait_figures import AIR_TIME, NO_ERROR, TrackingError, Walk, near
 from .gait_record import WalkRecord
 from .signals import Sway
 from .trial import Outcome, Trial
@@ -82,16 +82,22 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     outcome, loss = _outcome(env, trial, settled, touchdowns.count), "not quiet"
     if walk is not None:
         outcome, loss = walked(env, trial, outcome, walk), "off command"
+        if left_command(trial, outcome) and outcome.own_speed_error is None:
+            return against_unpushed(agent, trial, explained(env, trial, outcome, course, loss))
     elif stepped.tracking is not None:
         outcome, loss = followed(env, outcome, stepped.tracking), "motion"
     elif sway is not None and outcome.recovered:
         body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
         outcome = replace(outcome, sway=body, sway_recovery=recovery)
-    if outcome.recovered:
-        return outcome
-    return replace(
-        outcome, **asdict(diagnose(env, course.course(), first_start(trial) or 0.0, loss))
-    )
+    return outcome if outcome.recovered else explained(env, trial, outcome, course, loss)
+
+
+def explained(
+    env: BalanceEnv, trial: Trial, outcome: Outcome, course: CourseRecord, loss: str
+) -> Outcome:
+    """The outcome of a lost trial with its diagnosis; `loss` is the criterion without a fall."""
+    start = first_start(trial) or 0.0
+    return replace(outcome, **asdict(diagnose(env, course.course(), start, loss)))
 
 
 def first_start(trial: Trial) -> float | None:
@@ -104,8 +110,8 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     """The outcome of a trial with commands, with the figures of its walk.
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
-    (`Walk.as_commanded`), on a terrain to be beyond its last edge; there is no time of recovery
-    then, and no drift.
+    again, as near to the command as before the push (`Walk.as_commanded`), on a terrain to be
+    beyond its last edge; there is no time of recovery then, and no drift.
     """
     assert isinstance(env, CommandedEnv)  # it has taken the commands
     walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
@@ -130,8 +136,43 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
         last, passed = len(terrain.surfaces()) - 1, outcome.surfaces_passed
         outcome = replace(outcome, recovered=not env.fallen and passed == last)
     elif trial.commands[-1].array()[:3].any():
-        recovered = not env.fallen and walk.as_commanded(first)
-        outcome = replace(outcome, recovered=recovered)
+        own = None if first is None else walk.own_error(first)
+        last = None if env.fallen else walk.last_error()
+        recovered = last is not None and near(last, own or NO_ERROR)
+        outcome = replace(outcome, recovered=recovered, **_errors("own", own),
+                          **_errors("last", last))  # fmt: skip
+    return outcome
+
+
+def _errors(whose: str, error: TrackingError | None) -> dict[str, Any]:
+    """The figures of an outcome that say how far a walk is from its command."""
+    speed, turn = (None, None) if error is None else map(_finite, error)
+    return {f"{whose}_speed_error": speed, f"{whose}_turn_error": turn}
+
+
+def left_command(trial: Trial, outcome: Outcome) -> bool:
+    """Whether a walk was pushed, did not fall, and goes on otherwise than commanded."""
+    pushed = first_start(trial) is not None
+    return pushed and outcome.last_speed_error is not None and not outcome.recovered
+
+
+def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
+    """The outcome of a walk that had no settled stride before its push: it is compared with the
+    same trial without the push, which is played for that.
+    """
+    assert outcome.last_speed_error is not None and outcome.last_turn_error is not None
+    last = TrackingError(outcome.last_speed_error, outcome.last_turn_error)
+    env, record = agent.env, WalkRecord()
+    stepped = SteppedTrial(agent, replace(trial, pushes=(), kicks=()))
+    record(env)
+    while not stepped.done:
+        stepped.step()
+        record(env)
+    fell = env.simulation.time if env.fallen else None
+    own = Walk(record.arrays(), trial.commands, fell).own_error()
+    outcome = replace(outcome, **_errors("own", own))
+    if own is not None and near(last, own):
+        outcome = replace(outcome, recovered=True, **asdict(Diagnosis()))
     return outcome
 
 

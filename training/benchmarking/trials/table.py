@@ -1,12 +1,12 @@
 """Trials and outcomes as lines of trials.csv: what is written reads back exactly."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import parse_json
 from poise.configs.schema import build, to_dict
 from poise.envs.physics.pushes.push import Push
@@ -63,6 +63,32 @@ def _many(items: Sequence[Any]) -> str | None:
 def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
     """The columns of an outcome."""
     return dict(zip(OUTCOME_COLUMNS, asdict(outcome).values(), strict=True))
+
+
+def read_outcome(line: Mapping[str, str], path: Path) -> Outcome:
+    """The outcome of a line; raises ConfigError where it does not parse. A column that older
+    results lack is a field's default, and so is an empty cell."""
+    cells: dict[str, Any] = {}
+    for column, (name, hint) in zip(OUTCOME_COLUMNS, get_type_hints(Outcome).items(), strict=True):
+        text = line.get(column)
+        if not text:
+            continue
+        try:
+            cells[name] = _FROM_TEXT.get(hint, str)(text)
+        except (ValueError, KeyError):
+            raise ConfigError(f"trial {line['trial']}: {column} does not parse: {shown(text)}",
+                              source=path) from None  # fmt: skip
+    return build(Outcome, cells, f"{path}: trial {line['trial']}")
+
+
+#: type of a field → what reads it; others are texts
+_FROM_TEXT: dict[Any, Callable[[str], Any]] = {
+    bool: {"True": True, "False": False}.__getitem__,
+    int: int,
+    int | None: int,
+    float: float,
+    float | None: float,
+}
 
 
 def _push_cells(push: Push | None) -> dict[str, Cell]:

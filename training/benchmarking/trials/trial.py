@@ -59,6 +59,11 @@ class Trial:
         return self.pushes[0] if self.pushes else None
 
     @property
+    def judged_by_falls(self) -> bool:
+        """Whether it is won by not falling: a walk, but for one that is to get across a terrain."""
+        return bool(self.commands) and self.terrain is None
+
+    @property
     def options(self) -> dict[str, Any]:
         """The argument `options` of the environment's `reset`."""
         pushes = {"push": [*self.pushes, *self.kicks]}
@@ -75,8 +80,8 @@ class TrialFigures:
     """
 
     #: upright, quiet and with feet at rest for the last second; of a walk that goes on, not fallen,
-    #: and in the last two strides as commanded, see `Walk.as_commanded`; on a terrain, not fallen
-    #: and beyond its last edge; where a motion is performed, not fallen
+    #: and in the last two strides as commanded again, see `Walk.as_commanded`; on a terrain, not
+    #: fallen and beyond its last edge; where a motion is performed, not fallen
     recovered: bool
     fallen: bool
     fall_time: float | None = None  #: from the reset
@@ -142,6 +147,13 @@ class TrialFigures:
     #: phase of the stride at the start of the first push or kick: 0 where the left foot lands, 0.5
     #: where the right one does
     push_phase: float | None = None
+    #: largest distance of a stride's velocity from the command before the first push or kick, else
+    #: without it, see `Walk.own_error` [m/s]; of a walk that is pushed
+    own_speed_error: float | None = None
+    own_turn_error: float | None = None  #: the same of the turn rate [rad/s]
+    #: distance of the last two strides' mean velocity from the command [m/s]; None after a fall
+    last_speed_error: float | None = None
+    last_turn_error: float | None = None  #: the same of the turn rate [rad/s]
     edge_contacts: int = 0  #: times that a foot came to touch an edge of the terrain
     #: of a terrain, of which the CoM has passed the beginning; stairs climbed
     surfaces_passed: int | None = None
@@ -162,6 +174,11 @@ class TrialFigures:
     #: what the controller raised, on one line; the trial then counts as not recovered
     error: str | None = None
 
+    @property
+    def upright(self) -> bool:
+        """Not fallen, and the controller has not raised."""
+        return not self.fallen and self.error is None
+
 
 @dataclass(frozen=True)
 class Outcome(Diagnosis, TrialFigures):
@@ -169,6 +186,12 @@ class Outcome(Diagnosis, TrialFigures):
 
     Bases are listed from the last field to the first, as dataclasses collect them.
     """
+
+
+def won(trial: Trial, outcome: Outcome) -> bool:
+    """What J50, rankings and pairs count: of a walk on level ground not to have fallen, of all else
+    to have recovered."""
+    return outcome.upright if trial.judged_by_falls else outcome.recovered
 
 
 def failed(error: Exception) -> Outcome:

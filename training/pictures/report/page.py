@@ -226,7 +226,9 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
 def _ending(record: Record) -> str:
     if record.recovered:
         return "recovered"
-    return f"fell after {record.fall_time:.2f} s" if record.fallen else "stood, but not quiet"
+    if record.fallen:
+        return f"fell after {record.fall_time:.2f} s"
+    return "upright, not as commanded" if record.line.get("commands") else "stood, but not quiet"
 
 
 def _facts(results: Results) -> list[tuple[str, str]]:

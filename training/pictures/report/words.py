@@ -3,7 +3,7 @@
 import math
 
 from poise.training.benchmarking.diagnosis.words import towards
-from poise.training.benchmarking.evaluation.tables import assisted, places
+from poise.training.benchmarking.evaluation.tables import assisted, places, walked
 from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.trials.trial import Trial
 from poise.training.running.summary import both_ends
@@ -23,11 +23,21 @@ def lead(results: Results) -> list[str]:
     ranks = places(summary["controllers"])
     tied = [name for name in fair if ranks[name] == 1 and name != first]
     place = f"ties with {' and '.join(tied)} for the first place" if tied else "comes first"
-    said = [f"{first} {place}{alone}: it recovers {best['recovered_rate']:.1%} of "
-            f"{best['trials']} {what}."]  # fmt: skip
+    rate, tried = best["recovered_rate"], f"{best['trials']} {what}"
+    upright = best.get("never_fell_rate")
+    if upright is None:
+        said = [f"{first} {place}{alone}: it recovers {rate:.1%} of {tried}."]
+    elif walked(summary["controllers"]):
+        said = [f"{first} {place}{alone}: it does not fall in {upright:.1%} of {tried}, and goes "
+                f"on as commanded in {rate:.1%}."]  # fmt: skip
+    else:
+        said = [f"{first} {place}{alone}: it recovers {rate:.1%} of {tried}, and does not fall in "
+                f"{upright:.1%}."]  # fmt: skip
     if "j50_mean" in best:
         around = both_ends(best["j50_mean_ci95"])
-        text = f"Half of its trials are recovered at {best['j50_mean']:.1f} N·s"
+        fell = walked(summary["controllers"])
+        text = f"{'It falls in half' if fell else 'Half'} of its trials"
+        text += f"{'' if fell else ' are recovered'} at {best['j50_mean']:.1f} N·s"
         text += f" ({around[0]:.1f} to {around[1]:.1f})" if around else ""
         text += f": {best['eta_mean']:.2f} of the ankle limit, {best['eta_min']:.2f} in the worst"
         said.append(text + " direction, over all directions.")

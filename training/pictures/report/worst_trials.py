@@ -71,7 +71,7 @@ def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> li
     """
     recovered: dict[tuple[str, ...], dict[str, Record]] = {}
     for record in results.records:
-        if record.recovered:
+        if record.won:
             recovered.setdefault(record.met, {})[record.controller] = record
     exhibits = []
     for name in order:
@@ -91,8 +91,9 @@ def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> li
 
 
 def smallest_lost(results: Results, name: str) -> list[Record]:
-    """The trials that a controller did not recover, the smallest push first, without its errors."""
-    lost = [r for r in results.of(name) if not r.recovered and not r.error]
+    """The trials that a controller did not recover (of walks: in which it fell), the smallest push
+    first, without its errors."""
+    lost = [r for r in results.of(name) if not r.won and not r.error]
     return sorted(lost, key=_size)
 
 

@@ -78,6 +78,8 @@ def recorded_trial(
 
 
 def _end(outcome: Outcome) -> str:
+    if outcome.loss == "off command":
+        return "upright, not as commanded"
     return "recovered" if outcome.recovered else "fell" if outcome.fallen else "not quiet"
 
 
