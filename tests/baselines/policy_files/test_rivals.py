@@ -302,7 +302,9 @@ def amp_getup() -> Loop:
     past: list[np.ndarray] = []
 
     def observe(n: Now) -> np.ndarray:
-        past.append(frame(n.gyro, n.gravity, [0, 0, 0], n.q - BENT, n.v, np.clip(n.action, -10, 10)))
+        past.append(
+            frame(n.gyro, n.gravity, [0, 0, 0], n.q - BENT, n.v, np.clip(n.action, -10, 10))
+        )
         return frame(*(past[max(0, len(past) - 4 + i)] for i in range(4)))
 
     return Loop(G1, BENT, kp, kd, scale, observe, bound=10.0)
