@@ -196,6 +196,9 @@ class PolicyFileConfig:
         memory: inputs that are outputs of the step before; ``NAME_in`` and ``NAME_out``, and
             ``input_NAME`` and ``output_NAME``, are known to be.
         batch: whether the observation of TorchScript has an axis before its own; ONNX tells it.
+        warm_up: how many times a network that remembers is asked before a trial's first action;
+            what it answers then is not used.
+        warm_up_with: what it is asked: the first observation, or zeros.
         history: of several steps, oldest first: each term's side by side ("term"), or all terms of
             a step side by side ("frame").
         command: velocity that is asked for, forward and left [m/s], and turning left [rad/s],
@@ -210,6 +213,7 @@ class PolicyFileConfig:
         digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in,
             whatever the YAML file says.
         described_in: the file that says all this, for errors; filled in likewise.
+        said: the fields that a file says; the others are as they are by default. Filled in.
     """
 
     kind: Literal["policy-file"] = "policy-file"
@@ -232,6 +236,7 @@ class PolicyFileConfig:
     hold: float = field(default=15.0, metadata={"min": 0.0, "max": 200.0})
     digest: str = ""
     described_in: str = field(default="", compare=False)
+    said: tuple[str, ...] = field(default=(), compare=False, metadata={"omit": "default"})
     origin: Origin | None = field(default=None, metadata={"omit": "default"}, compare=False)
     held: tuple[float, ...] | dict[str, float | Held] | None = field(
         default=None, metadata={"omit": "default"}
@@ -240,6 +245,8 @@ class PolicyFileConfig:
     outputs: dict[str, str | int] = field(default_factory=dict, metadata={"omit": "default"})
     memory: tuple[Memory, ...] = _new(())
     batch: bool = _new(True)
+    warm_up: int = _new(0, min=0, max=10_000)
+    warm_up_with: Literal["first", "zeros"] = _new("first")
     phase_offsets: tuple[float, ...] = _new((0.0, 0.5))
     phase_runs: Literal["always", "commanded"] = _new("always")
 

@@ -27,7 +27,7 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .config import PolicyFileConfig
-from .joints import joint_servos
+from .joints import JointServos, joint_servos
 from .networks import load_network
 from .observations import Observer, follows_commands
 from .terms import Seen, roll_pitch
@@ -72,6 +72,15 @@ def policy_tick(t: PolicyTick):
         )  # fmt: skip
 
 
+def observer_of(
+    robot: Robot, config: PolicyFileConfig, joints: JointServos | None = None
+) -> Observer:
+    """The observations of a policy on a robot; raises ConfigError as `joint_servos`, `Observer`."""
+    joints = joint_servos(robot, config) if joints is None else joints
+    known, moved = ([robot.joint_names[i] for i in each] for each in (joints.index, joints.moved))
+    return Observer(config, known, moved, config.described_in)
+
+
 class PolicyFile(CompiledController):
     """Plays a policy from its files: the network every `policy_period`, PD in every physics step.
 
@@ -91,10 +100,8 @@ class PolicyFile(CompiledController):
         self.period = self.arrays.timestep
         every = whole_steps(config.policy_period, self.period, "policy_period", config.described_in)
         self.joints = joint_servos(robot, config)
-        known, moved = ([robot.joint_names[i] for i in each]
-                        for each in (self.joints.index, self.joints.moved))  # fmt: skip
-        self.observer = Observer(config, known, moved, config.described_in)
-        self.action = np.zeros(len(moved))
+        self.observer = observer_of(robot, config, self.joints)
+        self.action = np.zeros(len(self.joints.moved))
         self._legs = 2.0 * np.pi * np.array(config.phase_offsets)
         self.orders = guarded_zeros(COMMAND_ENTRIES) if follows_commands(config) else None
         self._clock_start: float | None = None  # [s]; None: it stands
@@ -161,6 +168,8 @@ class PolicyFile(CompiledController):
         observations = self.observer.observe(seen)
         if not all(np.all(np.isfinite(each)) for each in observations.values()):
             return  # the simulation diverged, which is a fall
+        if self._servos.ticks[0] == 0:
+            self.warm_up(observations)
         answer = self.network.act(observations)
         for role, values in answer.items():
             if lost := np.count_nonzero(~np.isfinite(values)):
@@ -173,6 +182,13 @@ class PolicyFile(CompiledController):
         self._servos.target[self.joints.moved] = self.joints.targets(action, attitude)
         for gain, values in answer.items():
             getattr(self._servos, gain)[self.joints.moved] = np.maximum(values, 0.0)
+
+    def warm_up(self, observations: dict[str, np.ndarray]) -> None:
+        """Let the network remember what it is asked, before its first action counts."""
+        if self.config.warm_up_with == "zeros":
+            observations = {name: np.zeros_like(each) for name, each in observations.items()}
+        for _ in range(self.config.warm_up):
+            self.network.act(observations)
 
     def _phase(self, now: float, walks: bool) -> float:
         """Of the clock [rad]; where it runs for a walk alone, it is 0 at rest and at its begin."""

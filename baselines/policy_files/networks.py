@@ -35,6 +35,15 @@ class Network(Protocol):
         Raises whatever the library of the network raises.
         """
 
+    def memories(self) -> dict[str, np.ndarray]:
+        """What it remembers now, by the names of the inputs or of the buffers that hold it."""
+
+    def remember(self, memories: Mapping[str, np.ndarray]) -> None:
+        """Let it remember other numbers, as many as it does.
+
+        Raises ConfigError for a memory that it does not have, and for another size.
+        """
+
 
 def load_network(path: Path, config: PolicyFileConfig | None = None) -> Network:
     """The network in an ONNX or a TorchScript file. TorchScript runs: ask `check_allowed` before.
@@ -95,6 +104,14 @@ class OnnxNetwork:
     def reset(self) -> None:
         self._memory = {name: np.zeros_like(value) for name, value in self._memory.items()}
 
+    def memories(self) -> dict[str, np.ndarray]:
+        return {name: value.astype(float) for name, value in self._memory.items()}
+
+    def remember(self, memories: Mapping[str, np.ndarray]) -> None:
+        for name, values in memories.items():
+            before = _same_size(self._memory, name, values, self.path)
+            self._memory[name] = values.astype(before.dtype).reshape(before.shape)
+
     def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         wanted = [*self._roles.values(), *self._pairs.values()]
         try:
@@ -113,6 +130,18 @@ class OnnxNetwork:
                                  f"not {_times(self._memory[name].shape)}")  # fmt: skip
         self._memory = memory
         return answer
+
+
+def _same_size(known: Mapping[str, Any], name: str, values: np.ndarray, path: Path) -> Any:
+    """The memory of a name, which is to be as large as these values."""
+    if name not in known:
+        raise ConfigError(f"{path.name} remembers nothing of that name", source=path, field=name,
+                          choices=known)  # fmt: skip
+    before = known[name]
+    if math.prod(before.shape) != values.size:
+        raise ConfigError(f"{path.name} remembers {_times(before.shape)} numbers, not "
+                          f"{_times(values.shape)}", source=path, field=name)  # fmt: skip
+    return before
 
 
 def _times(shape: Sequence[object]) -> str:
@@ -227,6 +256,22 @@ class ScriptNetwork:
         self._type = next((kind for kind in kinds if kind.is_floating_point), torch.float32)
         self._memory = [torch.zeros(each.shape, dtype=self._type) for each in self.config.memory]
 
+    def _kept(self) -> dict[str, Any]:
+        """What is given back, and the buffers in which a module keeps what it remembers itself."""
+        given = zip((each.input for each in self.config.memory), self._memory, strict=True)
+        return {**dict(self._module.named_buffers()), **dict(given)}
+
+    def memories(self) -> dict[str, np.ndarray]:
+        return {name: value.double().numpy().copy() for name, value in self._kept().items()}
+
+    def remember(self, memories: Mapping[str, np.ndarray]) -> None:
+        import torch
+
+        kept = self._kept()
+        for name, values in memories.items():
+            before = _same_size(kept, name, values, self.path)
+            before.copy_(torch.from_numpy(values.reshape(before.shape)).to(before.dtype))
+
     def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         import torch
 
@@ -243,13 +288,46 @@ class ScriptNetwork:
 
 
 def script_sizes(path: Path) -> tuple[int | None, int | None]:
-    """The numbers that TorchScript takes and gives, as its first and last matrix tell.
+    """The numbers that TorchScript takes and gives; None where that cannot be found out.
+
+    Nothing in the file says them, and the order of its weights is that of their names: an LSTM
+    before the layers may come behind them. So it is asked with each size that one of its weights
+    could take, with an axis for a batch and without. A module that takes a memory, too, cannot be
+    asked so: what its recurrent layer takes, or its first matrix, and its last layer tell.
 
     It runs: ask `check_allowed` before.
     """
-    matrices = [each for each in script_module(read_bytes(path, BYTES), path).parameters()
-                if each.dim() == 2]  # fmt: skip
-    return (matrices[0].shape[1], matrices[-1].shape[0]) if matrices else (None, None)
+    module = script_module(read_bytes(path, BYTES), path)
+    weights = {name: each.shape for name, each in module.state_dict().items()}
+    # a normaliser's mean, the weights of a recurrent layer, those of a layer
+    sizes = dict.fromkeys(shape[-1] for shape in weights.values() if len(shape) in (1, 2, 3))
+    for size in sorted(sizes, key=lambda size: size == 1):  # one number goes with any mean
+        for batch in ((1,), ()):
+            given = _answer_size(path, (*batch, size))
+            if given is not None:
+                return size, given
+    matrices = {name: shape for name, shape in weights.items() if len(shape) == 2}
+    recurrent = [shape for name, shape in matrices.items() if "weight_ih" in name]
+    layers = [shape for name, shape in matrices.items()
+              if "weight_ih" not in name and "weight_hh" not in name]  # fmt: skip
+    first, last = (recurrent + layers)[:1], layers[-1:]
+    return (first[0][1] if first else None), (last[0][0] if last else None)
+
+
+def _answer_size(path: Path, shape: tuple[int, ...]) -> int | None:
+    """The numbers of the first answer to zeros of a shape; None where it does not take them."""
+    import torch
+
+    module = script_module(read_bytes(path, BYTES), path)  # one that remembers begins anew
+    kinds = (value.dtype for value in module.parameters())
+    kind = next((each for each in kinds if each.is_floating_point), torch.float32)
+    try:
+        with torch.inference_mode():
+            found = module(torch.zeros(shape, dtype=kind))
+    except Exception:  # of other sizes, or it takes more than an observation
+        return None
+    first = found[0] if isinstance(found, (tuple, list)) else found
+    return int(first.numel()) if isinstance(first, torch.Tensor) else None
 
 
 def _place(output: str | int) -> int:

@@ -9,13 +9,13 @@ import numpy as np
 from poise.configs.errors import ConfigError
 
 from .config import ObservationTerm, PolicyFileConfig
-from .terms import COMMAND, KnownTerms, Place, Seen, Term, meaning
+from .terms import COMMANDS, SIZES, KnownTerms, Place, Seen, Term, meaning
 
 
 def follows_commands(config: PolicyFileConfig) -> bool:
     """Return whether a policy sees the velocity that is commanded."""
     parts = [part for parts in config.inputs.values() for part in parts]
-    return any(meaning(term) == COMMAND for part in parts for term in part.terms)
+    return any(meaning(term) in COMMANDS for part in parts for term in part.terms)
 
 
 class Observer:
@@ -37,7 +37,7 @@ class Observer:
         legs = len(config.phase_offsets)
         names = {"joint_pos": joints, "joint_pos_rel": joints, "joint_vel": joints,
                  "last_action": moved}  # fmt: skip
-        sizes = {"phase": 2, "roll_pitch": 2, "phase_sin": legs, "phase_cos": legs,
+        sizes = {**SIZES, "phase_sin": legs, "phase_cos": legs,
                  **{term: len(each) for term, each in names.items()}}  # fmt: skip
         known = KnownTerms({term: list(each) for term, each in names.items()}, sizes, source)
         self._inputs: dict[str, _Side | _Part] = {}

@@ -11,6 +11,7 @@ from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build, on_base
 
+from .bounds import with_pairs
 from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
 from .known import RIVALS, expect_network
@@ -91,11 +92,12 @@ def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
         try_network(path, version)
         metadata = onnx_session(path).get_modelmeta().custom_metadata_map
         below = {**metadata_fields(metadata, path), **below}
-    config = build(PolicyFileConfig, {**below, **data, "policy": str(path)}, source)
+    said = {**below, **data, "policy": str(path)}
+    config = build(PolicyFileConfig, with_pairs(said), source)
     if not config.observations or not all(config.inputs.values()):
         raise ConfigError(f"what the policy sees is not said; {advice(path)}", source=source,
                           field="observations")  # fmt: skip
-    return replace(config, digest=version, described_in=str(source))
+    return replace(config, digest=version, described_in=str(source), said=tuple(sorted(said)))
 
 
 def _network(name: str | None, folder: Path, source: Path) -> tuple[Path, str]:

@@ -277,6 +277,39 @@ def unitree_mjlab() -> Loop:
     return Loop(G1, default, kp, kd, scale, observe)
 
 
+def unitree_mjlab_2026() -> Loop:
+    """The same with a clock, which shows zeros at zero command; the waist yaws further."""
+    plain = unitree_mjlab()
+    scale = [*plain.scale[:12], 0.55, *plain.scale[13:]]
+
+    def observe(n: Now) -> np.ndarray:
+        return frame(n.gyro, n.gravity, [0, 0, 0], [0, 0], n.q - plain.default, n.v, n.action)
+
+    return plain._replace(scale=scale, observe=observe)
+
+
+def amp_getup() -> Loop:
+    """Four whole steps, oldest first, the first one before it; it sees its action within ±10."""
+    hip, knee, ankle, arm, wrist = 40.179, 99.098, 28.501, 14.251, 8.611
+    kp = [knee, knee, hip, knee, ankle, ankle] * 2 + [hip, ankle, ankle] + (
+        [arm] * 5 + [wrist] * 2) * 2  # fmt: skip
+    hip, knee, ankle, arm, wrist = 2.5579, 6.3088, 1.8144, 0.9072, 0.5482
+    kd = [knee, knee, hip, knee, ankle, ankle] * 2 + [hip, ankle, ankle] + (
+        [arm] * 5 + [wrist] * 2) * 2  # fmt: skip
+    hip, knee, ankle, wrist = 0.54755, 0.35066, 0.43858, 0.29033
+    scale = [knee, knee, hip, knee, ankle, ankle] * 2 + [hip, ankle, ankle] + (
+        [ankle] * 5 + [wrist] * 2) * 2  # fmt: skip
+    past: list[np.ndarray] = []
+
+    def observe(n: Now) -> np.ndarray:
+        past.append(
+            frame(n.gyro, n.gravity, [0, 0, 0], n.q - BENT, n.v, np.clip(n.action, -10, 10))
+        )
+        return frame(*(past[max(0, len(past) - 4 + i)] for i in range(4)))
+
+    return Loop(G1, BENT, kp, kd, scale, observe, bound=10.0)
+
+
 def unitree_lab() -> Loop:
     """Isaac Lab's order of joints, five steps of each term, oldest first, filled by the first."""
     order = [G1[i] for i in (0, 6, 12, 1, 7, 13, 2, 8, 14, 3, 9, 15, 22, 4, 10, 16, 23, 5, 11, 17,
@@ -316,6 +349,7 @@ def booster_deploy_law() -> Loop:
 
 
 LOOPS: dict[str, Callable[[], Loop]] = {
+    "amp-getup-g1": amp_getup,
     "asap-loco-g1": asap,
     "booster-deploy-t1": booster_deploy,
     "booster-deploy-t1-law": booster_deploy_law,
@@ -330,6 +364,7 @@ LOOPS: dict[str, Callable[[], Loop]] = {
     "twist2-g1": twist2,
     "unitree-g1-velocity": unitree_mjlab,
     "unitree-lab-g1": unitree_lab,
+    "unitree-mjlab-2026-03": unitree_mjlab_2026,
 }
 
 

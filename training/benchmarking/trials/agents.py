@@ -135,7 +135,9 @@ def _stand_in(config: ControllerConfig) -> str:
 def _wherever(config: ControllerConfig) -> ControllerConfig:
     """The same for a policy's files in any folder: their digest tells them apart."""
     if isinstance(config, PolicyFileConfig):
-        return replace(config, policy=Path(config.policy).name, described_in="", origin=None)
+        return replace(
+            config, policy=Path(config.policy).name, described_in="", said=(), origin=None
+        )
     return config
 
 

@@ -9,9 +9,15 @@ from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.known import PLACES, Known, find_network, how_to_get, places
 from poise.training.running.tables import text_table
 
-from .check import SECONDS, PolicyCheck
+from .check import PolicyCheck
 from .guess import WORDS
+from .proposals import SECONDS as TRIED
+from .standing import SECONDS, Stood
 
+OPEN = {
+    "history": "not said: how its history lies; each usual order was tried:",
+    "clock": "not said: what its clock shows at rest; tried:",
+}
 VERDICTS = {True: "right", False: "WRONG", None: "not told"}
 
 
@@ -61,15 +67,38 @@ def print_check(check: PolicyCheck, console: Console) -> None:
         return
     for name in check.unsaid:
         taken = getattr(PolicyFileConfig(), name)
-        say(f"not said: {name} ({WORDS[name]}); {taken or 'the first joints'} is taken")
-    stood = check.stood
-    how = f"fell after {stood.fell:.2f} s" if stood.fell is not None else (
-        f"stood for {SECONDS:g} s, {'at rest' if stood.rests else 'never at rest'}, "
-        f"{1000.0 * stood.moved:.0f} mm from where it began")  # fmt: skip
-    say(how)
+        if name == "joints":
+            taken = "the robot's first joints, in its order,"
+        say(
+            f"not said: {name} ({WORDS[name]}); {taken} {'are' if name == 'joints' else 'is'} taken"
+        )
+    _say_tried(check, say)
+    say(_how(check.stood, SECONDS))
     for finding in check.findings:
         say(f"  {VERDICTS[finding.right]}: {finding.what}: {finding.text}")
     say(_verdict(check))
+
+
+def _how(stood: Stood, seconds: float) -> str:
+    """How it stood, for so many seconds."""
+    if stood.fell is not None:
+        return f"fell after {stood.fell:.2f} s"
+    return (f"stood for {seconds:g} s, {'at rest' if stood.rests else 'never at rest'}, "
+            f"{1000.0 * stood.moved:.0f} mm from where it began")  # fmt: skip
+
+
+def _say_tried(check: PolicyCheck, say: Callable[[str], None]) -> None:
+    """The readings that were tried of what is left open, and the one that is proposed."""
+    for what in dict.fromkeys(each.what for each in check.tried):
+        say(OPEN[what])
+        for each in check.tried:
+            if each.what == what:
+                say(f"  {each.name}: {_how(each.stood, TRIED)}")
+    if sum(each.stood.fell is None for each in check.tried if each.what == "history") > 1:
+        say("more than one of them stands: a rollout (--rollout) tells which is right")
+    if check.proposed is not None:
+        say(f"so read, {check.proposed.name}, it does best; in the description:")
+        say(check.proposed.lines)
 
 
 def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:
@@ -101,6 +130,8 @@ def _verdict(check: PolicyCheck) -> str:
     wrong = sum(each.right is False for each in check.findings)
     if wrong:
         return f"the adapter is wrong: {wrong} of {len(check.findings)} findings speak against it"
+    if check.amends and check.stood is not None and check.stood.fell is None:
+        return "it stands, read as proposed: its own description does not fit its network"
     if check.stood is not None and check.stood.fell is not None:
         return "it does not stand: another robot, gains, order of joints, or term than its own"
     if not check.findings:

@@ -23,7 +23,7 @@ from poise.training.cli.entry import main
 from poise.training.deploy.policy_check import check as checking
 from poise.training.deploy.policy_check.check import Stood, check_policy
 from poise.training.deploy.policy_check.guess import layouts
-from poise.training.deploy.policy_check.rollout import Finding, compare, read_rollout
+from poise.training.deploy.policy_check.rollout import Finding, compare
 from tests.support.policies import linear, write_onnx, write_yaml
 from tests.support.shared import robot
 
@@ -126,7 +126,7 @@ def record(place: Path) -> None:
 def findings(place: Path, rollout: str = "full.npz", **changes: Any) -> list[Finding]:
     config = controller_config(str(described(place, **changes)))
     policy = PolicyFile(robot("compact"), config)
-    return compare(policy, read_rollout(place / rollout), place / rollout)
+    return compare(policy, place / rollout)
 
 
 def test_a_right_adapter_agrees_with_its_makers_rollout(folder: Path) -> None:
@@ -167,8 +167,8 @@ def test_another_network_answers_otherwise(folder: Path, tmp_path: Path) -> None
     write_onnx(tmp_path / "policy.onnx", linear(9 + 3 * N, N, 0.05, seed=1))
     (network, *_) = compare(
         PolicyFile(robot("compact"), controller_config(str(described(tmp_path)))),
-        read_rollout(folder / "full.npz"), folder,
-    )  # fmt: skip
+        folder / "full.npz",
+    )
     assert network.what == "network" and network.right is False
 
 
@@ -228,8 +228,24 @@ def test_what_is_not_said_is_taken_and_told(tmp_path: Path) -> None:
     write_onnx(tmp_path / "policy.onnx", linear(3, N))
     path = write_yaml(tmp_path / "own.yaml", kind="policy-file", motors=list(range(N)), damping=3.0,
                       observations=[{"term": "base_ang_vel"}])  # fmt: skip
-    assert check_policy(str(path), robot("compact")).unsaid == (
-        "default", "stiffness")  # fmt: skip
+    unsaid = check_policy(str(path), robot("compact")).unsaid
+    assert unsaid == ("default", "stiffness", "action_scale")
+
+
+def test_what_is_said_as_it_is_by_default_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Gains of 40 and 1 and a posture of zeros may be a maker's own; joints have no names here."""
+    write_onnx(tmp_path / "policy.onnx", linear(3, N))
+    usual = {"default": [0.0] * N, "stiffness": 40.0, "damping": 1.0, "action_scale": 0.25}
+    path = write_yaml(tmp_path / "own.yaml", kind="policy-file",
+                      observations=[{"term": "base_ang_vel"}], **usual)  # fmt: skip
+    assert check_policy(str(path), robot("compact")).unsaid == ("joints",)
+    main(["policies", "check", str(path), "--robot", "compact"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert (
+        "not said: joints" in text and "the robot's first joints, in its order, are taken" in text
+    )
 
 
 def test_a_known_network_is_recognised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
