@@ -127,6 +127,16 @@ FAILURES = Figure("solver_failures", "solver failures", ".0f", words="ticks at w
 STEPS_TAKEN = Figure("steps_mean", "steps, mean", ".1f", where=_some("steps_mean"))
 NEVER_FELL = Figure("never_fell_rate", "never fell", ".1%", ends="never_fell_ci95",
                     where=lambda e: "j50_mean" not in e and "fraction50" not in e)  # fmt: skip
+UP_AGAIN = (
+    Figure(
+        "up_again_rate",
+        "up again",
+        ".0%",
+        words="fraction of the robots that were down, by a fall or from the start",
+        ends="up_again_ci95",
+    ),
+    Figure("up_time_median", "time to get up", ".1f", "s", "median"),
+)
 AT_REST = (
     _mm("com_drift_max", "CoM drift", "largest"),
     _mm("foot_drift_max", "feet drift", "largest"),

@@ -33,7 +33,8 @@ environment's generator. `reset(options=...)` takes
 
 End: `terminated` by a fall: CoM below `fall.height` of its standing height, root tilted by more
 than `fall.tilt`, anything but the feet on the ground (`fall.ground_contact`), or a simulation that
-diverged; with `fall.terminates` false only by the last. `truncated` after `duration` seconds. `step` then needs a `reset`.
+diverged; with `fall.terminates` false by the last alone. `truncated` after `duration` seconds.
+`step` then needs a `reset`.
 
 Info: "reward_terms" (name → weighted value; their sum is the reward), "push" (a list: start, force
 [N], duration [s], body, direction [deg], impulse J [N·s], specific_impulse J/m [N·s/kg]),
