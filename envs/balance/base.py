@@ -35,6 +35,7 @@ from .episode import (
     FALLEN,
     QUIET_STEPS,
     SATURATED,
+    TERMINATED,
     TICKS,
     EpisodeArrays,
     Judge,
@@ -288,7 +289,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
         `options`: "push" sets the pushes exactly (a mapping, a list of mappings, [] for none; see
         `parse_pushes`), "noise" scales the start noise, "qpos" (nq,) and "qvel" (nv,) are the
-        start itself; "realism" fixes fields of the level, a mapping.
+        start itself, "fallen" is the number of a posture on the ground to start from (see
+        `fallen_posture`); "realism" fixes fields of the level, a mapping.
 
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
@@ -297,7 +299,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         super().reset(seed=seed_number(seed))
         rng = self.np_random
         self._draw(options.get("realism"), rng)
-        qpos, qvel = chosen_start(self.simulation, self.config.noise, options, rng)
+        qpos, qvel = chosen_start(
+            self.simulation, self.config.noise, self.config.fallen, options, rng
+        )
         state = self.simulation.reset(qpos, qvel)
         pushes = chosen_pushes(options.get("push"), self.push_sampler, self.robot, state, rng)
         self.simulation.set_pushes(pushes)
@@ -350,7 +354,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         """Take the step of an action that has been set: reward, terminated, truncated."""
         self.expect_running()
         self.advance()
-        terminated = self.fallen
+        terminated = bool(self.episode.metrics[TERMINATED])
         truncated = not (terminated or self.episode.running[0])
         return float(self.episode.reward[0]), terminated, truncated
 
@@ -365,7 +369,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     @property
     def fallen(self) -> bool:
-        """True after a fall."""
+        """True after a fall; where a fall does not end the episode, while the robot is down."""
         return bool(self.episode.metrics[FALLEN])
 
     @property

@@ -58,6 +58,7 @@ class EnvConfig:
         duration: Length of an episode [s].
         pushes: Pushes that are drawn at a reset; None: none.
         noise: Disturbance of the start.
+        fallen: Fraction of the episodes that begin on the ground, in one of `FALLEN_POSTURES`.
         fall: When the robot has fallen, and when it is quiet.
         reward: Weights of the reward's terms.
         observation: What the observation is made of.
@@ -73,6 +74,7 @@ class EnvConfig:
         default_factory=lambda: PushSampler(magnitude=(0.2, 0.5), unit="specific_impulse")
     )
     noise: StartNoise = field(default_factory=StartNoise)
+    fallen: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, **OMIT})
     fall: FallLimits = field(default_factory=FallLimits)
     reward: RewardWeights = field(default_factory=RewardWeights)
     observation: ObservationConfig = field(default_factory=ObservationConfig, metadata=OMIT)

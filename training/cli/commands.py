@@ -77,6 +77,7 @@ def evaluate(
     write_limits: Path | None = None,
     motions: tuple[str, ...] = (),
     realism: str | None = None,
+    get_up: bool = False,
     overwrite: Overwrite = False,
     json: Json = False,
     allow: Allow = (),
@@ -107,6 +108,8 @@ def evaluate(
             .yaml files; its own if not given.
         realism: how real the robot is: ideal (its state is known exactly and at once), lab, field,
             or a .yaml file of a level; that of the suite if not given.
+        get_up: a robot that falls has 10 s to get up again: up again, and in what time, are
+            figures of their own.
     """
     from poise.configs.outputs import check_out_file
     from poise.training.benchmarking.trials.names import check_names
@@ -119,8 +122,8 @@ def evaluate(
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, limits=limits, motions=motions, realism=realism, overwrite=overwrite,
-        console=terminal(stderr=json), allow=allow,
+        trials=trials, limits=limits, motions=motions, realism=realism, get_up=get_up,
+        overwrite=overwrite, console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)

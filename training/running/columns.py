@@ -135,6 +135,16 @@ FAILURES = Figure("solver_failures", "solver failures", ".0f", words="ticks at w
 STEPS_TAKEN = Figure("steps_mean", "steps, mean", ".1f", where=_some("steps_mean"))
 NOT_FALLEN = Figure("never_fell_rate", "not fallen", ".0%", words="fraction of all trials",
                     ends="never_fell_ci95")  # fmt: skip
+UP_AGAIN = (
+    Figure(
+        "up_again_rate",
+        "up again",
+        ".0%",
+        words="fraction of the robots that were down, by a fall or from the start",
+        ends="up_again_ci95",
+    ),
+    Figure("up_time_median", "time to get up", ".1f", "s", "median"),
+)
 AT_REST = (
     _mm("com_drift_max", "CoM drift", "largest"),
     _mm("foot_drift_max", "feet drift", "largest"),

@@ -33,7 +33,16 @@ class Rate(TypedDict):
     never_fell_ci95: NotRequired[Interval]
 
 
-class Counts(Rate, total=False):
+class Rising(TypedDict, total=False):
+    """Robots that were down, by a fall or from the start, and how many were up again."""
+
+    downs: int
+    up_again_rate: float
+    up_again_ci95: Interval
+    up_time_median: Number
+
+
+class Counts(Rate, Rising, total=False):
     """Counts of how trials ended, and medians of what was recorded."""
 
     recovered_with_step: int

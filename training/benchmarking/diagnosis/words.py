@@ -18,6 +18,7 @@ LOSSES = {
     "not quiet": "stood at the end, but was not upright and at rest",
     "off command": "stayed upright, but did not walk on as commanded again",
     "motion": "fell from the motion",
+    "down": "did not get up",
     "error": "the controller raised an error",
 }
 NUMBERS = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
@@ -70,7 +71,7 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
 
 def cause(d: Diagnosis, steps: int) -> str:
     """The cause of a loss in a few words, without numbers and sides, to count by."""
-    if d.loss in ("diverged", "error"):
+    if d.loss in ("diverged", "error", "down"):
         return LOSSES[d.loss]
     first = "no motor of the legs at its limit"
     if d.hardware is not None:

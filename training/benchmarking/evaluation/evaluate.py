@@ -35,6 +35,7 @@ def evaluate(
     limits: str | Path | None = None,
     motions: Sequence[str] = (),
     realism: str | None = None,
+    get_up: bool = False,
     overwrite: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
@@ -60,6 +61,7 @@ def evaluate(
         limits: what pushes are measured by, see `load_limits`.
         motions: names and files of motions, for a suite that performs some, instead of its own.
         realism: a packaged level of realism or a path to one, instead of the suite's.
+        get_up: a robot that falls has 10 s to get up again, which is a figure of its own.
         overwrite: replace what `out` holds.
         console: where progress and tables are printed; None: nowhere.
         allow: controllers from outside (``module:Class``) that may run though they are not among
@@ -74,7 +76,7 @@ def evaluate(
     run = Run(
         controllers, suite, out, robot, seed, workers, backend, trials, overwrite, console,
         reference=None, measured=lambda loaded: load_limits(loaded, limits), motions=motions,
-        realism=realism,
+        realism=realism, get_up=get_up,
     )  # fmt: skip
     return run.play(plots=True)
 

@@ -55,6 +55,7 @@ from .tables import print_lost, print_summary, ranked
 from .tick_times import tick_times
 
 FEW = 5  # controllers, of which the rate of each is shown while they play
+GET_UP_TIME = 10.0  # [s] after a fall
 
 
 class Run:
@@ -72,7 +73,7 @@ class Run:
         workers: int | None, backend: str, trials: int | None, overwrite: bool,
         console: Console | None, *, reference: str | None,
         measured: Callable[[Robot], PushLimits], motions: Sequence[str] = (),
-        realism: str | None = None,
+        realism: str | None = None, get_up: bool = False,
     ):  # fmt: skip
         self.started, self.console = time.perf_counter(), console or Console(quiet=True)
         names = expand_seeds(controllers)
@@ -85,6 +86,8 @@ class Run:
             self.suite = self.suite.resized(trials)
         if realism is not None:
             self.suite = replace(self.suite, realism=realism, levels=())
+        if get_up:
+            self.suite = replace(self.suite, get_up_time=GET_UP_TIME)
         for level in (self.suite.realism, *self.suite.levels):
             load_realism(level)
         self.out, self.overwrite, self.executor = Path(out), overwrite, Executor(backend, workers)

@@ -30,6 +30,7 @@ from poise.training.running.columns import (
     RECOVERED,
     ROBUST,
     STEPS_TAKEN,
+    UP_AGAIN,
     known,
 )
 from poise.training.running.summary import Entry, Summary
@@ -197,6 +198,7 @@ def table_cells(summary: Summary) -> dict[str, list[str]]:
         *(J50_WORST, ETA_MEAN, ETA_WORST),
         replace(HALF_AT, name=f"{HALF_AT.name}, of {summary['scale']}"),
         *rates,
+        *UP_AGAIN,
         *(LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
     )
     return {

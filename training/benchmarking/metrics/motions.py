@@ -39,7 +39,8 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
     """What all trials of a suite share, whose results are in `folder`."""
     chosen = suite.motions
     if chosen is None:
-        return Stage(robot, suite.duration, suite.noise)
+        again = suite.get_up_time or (None if suite.get_up is None else 0.0)
+        return Stage(robot, suite.duration, suite.noise, get_up=again)
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
     return Stage(robot, LONGEST, suite.noise, ((STANDING, STANDING), *files), chosen.tempo)

@@ -15,7 +15,7 @@ from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.benchmarking.trials.trial import won as is_won
-from poise.training.running.trial_figures import Counts, Rate
+from poise.training.running.trial_figures import Counts, Rate, Rising
 
 Key = TypeVar("Key")
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
@@ -146,9 +146,25 @@ def counts(played: Played) -> Counts:
         "peak_torque_median": over("peak_torque", np.median),
         "mean_abs_action": over("mean_abs_action", np.mean),
         "mean_abs_action_max": over("mean_abs_action", np.max),
+        **rising(outcomes),
         "com_drift_max": over("com_drift", np.max),
         "foot_drift_max": over("foot_drift", np.max),
         "unpushed_lean_max": over("final_lean", np.max, unpushed),
+    }
+
+
+def rising(outcomes: Sequence[Outcome]) -> Rising:
+    """Of the robots that were down and watched, the fraction that was up again, and when."""
+    watched = [outcome for outcome in outcomes if outcome.up_again is not None]
+    if not watched:
+        return {}
+    up = sum(bool(outcome.up_again) for outcome in watched)
+    times = [each.up_time for each in watched if each.up_time is not None]
+    return {
+        "downs": len(watched),
+        "up_again_rate": up / len(watched),
+        "up_again_ci95": wilson_interval(up, len(watched)),
+        "up_time_median": float(np.median(times)) if times else None,
     }
 
 

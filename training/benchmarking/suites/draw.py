@@ -35,6 +35,8 @@ class Standard:
     push_duration: float = field(default=0.1, metadata={"above": 0.0})  # [s]
     interval: float = field(default=1.0, metadata={"above": 0.0})  # between repeated pushes [s]
     body: str | None = None  # the robot's first push body
+    # time after a fall in which the robot may get up again [s]; 0: a fall ends the trial
+    get_up_time: float = field(default=0.0, metadata={"min": 0.0, "max": 1e3, "omit": "default"})
     realism: str = field(default=IDEAL, metadata={"omit": "default"})  # a level or a file of one
     noise: StartNoise = field(default_factory=StartNoise)
 
@@ -51,6 +53,7 @@ class Marks(TypedDict, total=False):
     terrain: Terrain | None
     motion: str | None
     share: float | None
+    start: int | None
 
 
 class Draw:

@@ -87,9 +87,12 @@ class Plan:
         A scenario's own level has the last word in the suite's.
         """
         real = self.suite.realism if level is None else level
-        found = []
+        wait, found = self.suite.get_up_time, []
         for trial in trials:
             own = at = trial.conditions.realism
+            if wait and trial.start is None:
+                until = trial.until or self.suite.duration
+                trial = replace(trial, until=until, get_up=wait)
             part = trial.part or name
             if real != IDEAL and (own is None or level is not None):
                 at = real

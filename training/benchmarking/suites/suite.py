@@ -14,6 +14,7 @@ from poise.configs.schema import build, read_yaml
 from .directions import Envelope, Grid, Margin
 from .draw import Part, Standard
 from .factors import Factors, Mix
+from .getting_up import GetUp
 from .motions import Motions
 from .random import Quiet, Random, Sequence
 from .scenarios import Scenarios
@@ -45,6 +46,7 @@ class Suite(Standard):
     terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
     motions: Motions | None = field(default=None, metadata={"omit": "default"})
     scenarios: Scenarios | None = field(default=None, metadata={"omit": "default"})
+    get_up: GetUp | None = field(default=None, metadata={"omit": "default"})
     levels: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
 
     def __post_init__(self) -> None:

@@ -29,11 +29,16 @@ class Stage:
     #: these then
     motions: tuple[tuple[str, str], ...] = ()
     tempo: Tempo = field(default_factory=Tempo)  #: at which they are played
+    #: time after a fall in which the robot may get up [s]; None: a fall ends the trial
+    get_up: float | None = None
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
-        given: dict[str, Any] = {"duration": self.duration, "pushes": None, "noise": self.noise}
+        duration = self.duration + (self.get_up or 0.0)
+        given: dict[str, Any] = {"duration": duration, "pushes": None, "noise": self.noise}
+        if self.get_up is not None:
+            given["fall"] = {"terminates": False}
         if self.motions:
             given["fall"] = ANYWHERE
         if self.tempo.waits:

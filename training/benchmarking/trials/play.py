@@ -22,6 +22,7 @@ from poise.training.motion.tracking.record import Tracking
 from .agents import Agent
 from .gait_figures import AIR_TIME, NO_ERROR, TrackingError, Walk, near
 from .gait_record import WalkRecord
+from .rising import Rise, Rising
 from .signals import Sway
 from .trial import Outcome, Trial
 
@@ -40,7 +41,7 @@ class SteppedTrial:
     """
 
     def __init__(self, agent: Agent, trial: Trial):
-        self._agent, self.done, env = agent, False, agent.env
+        self._agent, self._trial, self.done, env = agent, trial, False, agent.env
         until, period = trial.until, env.config.policy_period
         self._steps = env.max_steps if until is None else round(until / period)
         self._observation, _ = env.reset(seed=trial.seed, options=trial.options)
@@ -56,15 +57,28 @@ class SteppedTrial:
         _, terminated, truncated = env.step_without_info(action)
         self._observation = env.episode.observation.astype(np.float32)
         self.done = terminated or truncated or env.steps >= self._steps
+        self.done |= env.fallen and self._trial.start is None
         if self.tracking is not None:
             self.tracking.update()
             self.done |= self.tracking.ended
         return action
 
+    def rise(self, duration: float) -> Rise:
+        """Go on for `duration` [s] with a robot that is down, at most until it is up again."""
+        env, rising = self._agent.env, Rising(self._agent.env)
+        for _ in range(round(duration / env.config.policy_period)):
+            if not env.episode.running[0] or rising.held:
+                break
+            self.step()
+            rising.update()
+        return rising.outcome()
+
 
 def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
     """Play a trial to its end in the environment that the agent has."""
     env, stepped = agent.env, SteppedTrial(agent, trial)
+    if trial.start is not None:
+        return rise_trial(env, trial, stepped, watch)
     settled, course = Settled(), CourseRecord()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
     stands = not trial.commands and stepped.tracking is None
@@ -89,7 +103,12 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     elif sway is not None and outcome.recovered:
         body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
         outcome = replace(outcome, sway=body, sway_recovery=recovery)
-    return outcome if outcome.recovered else explained(env, trial, outcome, course, loss)
+    if outcome.recovered:
+        return outcome
+    outcome = explained(env, trial, outcome, course, loss)
+    if trial.get_up and env.fallen and env.episode.running[0]:
+        return replace(outcome, **asdict(stepped.rise(trial.get_up)))
+    return outcome
 
 
 def explained(
@@ -98,6 +117,34 @@ def explained(
     """The outcome of a lost trial with its diagnosis; `loss` is the criterion without a fall."""
     start = first_start(trial) or 0.0
     return replace(outcome, **asdict(diagnose(env, course.course(), start, loss)))
+
+
+def rise_trial(
+    env: BalanceEnv, trial: Trial, stepped: SteppedTrial, watch: Watch | None
+) -> Outcome:
+    """The outcome of a trial that starts on the ground: `recovered` is to be up at its end."""
+    rising, settled = Rising(env), Settled()
+    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    while not stepped.done:
+        if watch is not None:
+            watch(env)
+        action = stepped.step()
+        rising.update()
+        touchdowns.update(env.simulation.state.contacts)
+        settled.update(env, action)
+    if watch is not None:
+        watch(env)
+    rise = rising.outcome()
+    outcome = _outcome(env, trial, settled, touchdowns.count)
+    return replace(
+        outcome,
+        **asdict(rise),
+        recovered=rise.up_again,
+        loss=None if rise.up_again else "down",
+        recovery_time=None,
+        com_drift=None,
+        foot_drift=None,
+    )
 
 
 def first_start(trial: Trial) -> float | None:

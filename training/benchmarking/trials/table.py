@@ -23,15 +23,15 @@ CONDITIONS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
     *(*PUSH_COLUMNS, *CONDITIONS, "limit_fraction", "later", "commands"),
-    *("kicks", "terrain", "motion", "share", "until"),
+    *("kicks", "terrain", "motion", "share", "until", "start_posture", "get_up"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
 )
 COLUMNS = (*CASE_COLUMNS, *OUTCOME_COLUMNS)
 TEXTS = ("controller", "part", "factor", "level", "body", "profile", "realism", "motion")
-WHOLE = ("trial", "seed", "stage")
-FULL = (*WHOLE, "delay", "mass_error")  # columns without empty cells
+WHOLE = ("trial", "seed", "stage", "start_posture")
+FULL = ("trial", "seed", "stage", "delay", "mass_error")  # columns without empty cells
 AS_JSON = ("later", "commands", "kicks", "terrain")  # of all other columns a cell is a number
 
 
@@ -49,6 +49,7 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
         "later": _many(trial.pushes[1:]),
         "commands": _many(trial.commands),
         "kicks": _many(trial.kicks),
+        "start_posture": trial.start,
         "terrain": None if trial.terrain is None else json.dumps(to_dict(trial.terrain)),
     }
     case = {name: cells[name] if name in cells else getattr(trial, name) for name in CASE_COLUMNS}
@@ -115,6 +116,7 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
     except (ValueError, TypeError) as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
     cells["number"] = cells.pop("trial", None)
+    cells["start"] = cells.pop("start_posture", None)
     cells.pop("controller", None)
     source = f"{path}: trial {line['trial']}"
     return build(Trial, {"pushes": pushes, "conditions": conditions, **cells}, source)

@@ -47,6 +47,9 @@ class Trial:
     motion: str | None = None
     share: float | None = None  #: of the controller's J50 that the push is
     until: float | None = None  #: when it ends [s]; None: when those of its suite do
+    #: number of the posture on the ground that it starts from; None: it starts on its feet
+    start: int | None = None
+    get_up: float | None = None  #: time after a fall in which the robot may get up again [s]
 
     @property
     def command(self) -> TimedCommand | None:
@@ -67,7 +70,9 @@ class Trial:
     def options(self) -> dict[str, Any]:
         """The argument `options` of the environment's `reset`."""
         pushes = {"push": [*self.pushes, *self.kicks]}
-        return {**pushes, "command": list(self.commands)} if self.commands else pushes
+        commands = {"command": list(self.commands)} if self.commands else {}
+        fallen = {} if self.start is None else {"fallen": self.start}
+        return {**pushes, **commands, **fallen}
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,8 @@ class TrialFigures:
 
     #: upright, quiet and with feet at rest for the last second; of a walk that goes on, not fallen,
     #: and in the last two strides as commanded again, see `Walk.as_commanded`; on a terrain, not
-    #: fallen and beyond its last edge; where a motion is performed, not fallen
+    #: fallen and beyond its last edge; where a motion is performed, not fallen; from a
+    #: start on the ground, up for the last second
     recovered: bool
     fallen: bool
     fall_time: float | None = None  #: from the reset
@@ -169,6 +175,10 @@ class TrialFigures:
     placement_error: float | None = None
     support_slide: float | None = None
     interruptions: float | None = None
+    #: whether a robot that fell, or began on the ground, was up again for a second at the end: the
+    #: root within 30° of standing, the CoM at 0.8 of its height, only the feet on the ground
+    up_again: bool | None = None
+    up_time: float | None = None  #: from the fall, or the start on the ground, until it was up
     #: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`
     drawn: str | None = None
     #: what the controller raised, on one line; the trial then counts as not recovered
