@@ -14,6 +14,7 @@ from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
 from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.results.read import Record, Results, load_results
+from poise.training.benchmarking.trials.agents import code_of
 from poise.training.pictures.figures.style import Inline
 from poise.training.pictures.figures.time_series import signal_keys, trial_timeseries
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
@@ -218,7 +219,7 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
         "command": shlex.join([
             *("poise", "replay", str(results.folder), "--trial", str(record.trial)),
             *("--controllers", record.controller, "--video", "trial.mp4"),
-            *allow_words(record.controller),
+            *allow_words(code_of(record.controller)),
         ]),
     }  # fmt: skip
 
