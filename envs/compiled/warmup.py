@@ -25,9 +25,10 @@ _tried: set[str] = set()  # parts that this process has had compiled, or could n
 def fill_cache(module: str, names: Mapping[str, str], *groups: Sequence[str]) -> None:
     """Compile what is missing: each group is a list of functions of `module`, its parts.
 
-    `names` says what each part is, in the line that a user reads meanwhile. The parts of a group are compiled at the same time, and use the kernels of the groups before
-    it. Each processor has a process, which takes every so many-th part of the group in turn: those
-    that take longest should stand first. Where no cache can be written, nothing happens.
+    `names` says what each part is, in the line that a user reads meanwhile. The parts of a group
+    are compiled at the same time, and use the kernels of the groups before it. Each processor has a
+    process, which takes every so many-th part of the group in turn: those that take longest should
+    stand first. Where no cache can be written, nothing happens.
     """
     if _compiling or jit.CACHE is None:
         return
