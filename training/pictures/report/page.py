@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from poise.baselines.allowance import allow_words, allowing
-from poise.configs.errors import PoiseError
+from poise.configs.errors import PoiseError, raised
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
 from poise.training.benchmarking.evaluation.tables import assisted
@@ -173,7 +173,7 @@ def _film(
     except PoiseError as error:
         reason = str(error)
     except Exception as error:  # a controller from outside may raise anything
-        reason = f"{type(error).__name__}: {error}"
+        reason = raised(error)
     note = f"{record.controller} was not played again: {reason}."
     if note not in notes:
         notes.append(note)
