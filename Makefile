@@ -1,4 +1,4 @@
-# make setup   .venv with everything in it (once; again when the requirements change)
+# make setup   .venv with everything in it, kernels compiled (once; again when the requirements change)
 # make test    the tests                    make demo    the main job, with a table and plots
 # make check   format, lint and types       make format  put the format and imports right
 # make docs    the site of docs/ and the docstrings, in build/site
@@ -43,6 +43,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(if $(LOCKED),$(PYTHON) -m pip install -q $(PIP_ARGS) --require-hashes -r requirements.lock)
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt setuptools
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt --no-build-isolation -e ".[dev]"
+	$(PYTHON) -m poise.baselines.warmup
 	touch $@
 
 test: setup

@@ -357,14 +357,14 @@ def list_names(*, json: Json = False) -> None:
     """List what can be named: robots, controllers, policies with their J50, suites and the like."""
     from poise.baselines.motion.clips.library import packaged_clips
     from poise.baselines.motion.synthesis.scripts.library import packaged_scripts
-    from poise.training.running.options.names import named
+    from poise.training.running.options.names import named, suites_of_j50
     from poise.training.running.options.pages import print_names
 
     more = {"clips": packaged_clips(), "scripts": packaged_scripts()}
     if json:
         print_json({**named(), **more})
         return
-    print_names(named(), terminal())
+    print_names(named(), suites_of_j50(), terminal())
     for kind, names in more.items():
         print(f"{kind}: {', '.join(names)}")
     print("also as controllers: zero, a folder written by poise train, my_file.py:Class")

@@ -12,6 +12,7 @@ from rich.table import Table
 from poise.baselines.allowance import allow_words
 from poise.training.benchmarking.diagnosis.words import told_losses
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
+from poise.training.benchmarking.trials.agents import code_of
 from poise.training.running.columns import (
     AS_COMMANDED,
     AT_REST,
@@ -176,7 +177,7 @@ def print_lost(
         some = ", ".join(str(number) for number in numbers[:SHOWN])
         more = f", … ({len(numbers)})" if len(numbers) > SHOWN else ""
         command = ["poise", "view", str(folder), "--trial", str(numbers[0]), "--controllers", name]
-        command += allow_words(name)
+        command += allow_words(code_of(name))
         lines = [f"lost trials of {name}: {some}{more} ({shlex.join(command)})"]
         if told := told_losses(entries[name].get("losses", [])):
             lines.append(f"  {told}")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from poise.baselines.walking.schedule import TimedCommand
+from poise.configs.errors import raised
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.terrain.terrain import Terrain
 from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis
@@ -206,5 +207,4 @@ def won(trial: Trial, outcome: Outcome) -> bool:
 
 def failed(error: Exception) -> Outcome:
     """The outcome of a trial in which the controller raised."""
-    text = " ".join(f"{type(error).__name__}: {error}".split())
-    return Outcome(recovered=False, fallen=False, error=text, loss="error")
+    return Outcome(recovered=False, fallen=False, error=raised(error), loss="error")

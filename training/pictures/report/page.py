@@ -9,11 +9,12 @@ from pathlib import Path
 from rich.console import Console
 
 from poise.baselines.allowance import allow_words, allowing
-from poise.configs.errors import PoiseError
+from poise.configs.errors import PoiseError, raised
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
 from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.results.read import Record, Results, load_results
+from poise.training.benchmarking.trials.agents import code_of
 from poise.training.pictures.figures.style import Inline
 from poise.training.pictures.figures.time_series import signal_keys, trial_timeseries
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
@@ -172,7 +173,7 @@ def _film(
     except PoiseError as error:
         reason = str(error)
     except Exception as error:  # a controller from outside may raise anything
-        reason = f"{type(error).__name__}: {error}"
+        reason = raised(error)
     note = f"{record.controller} was not played again: {reason}."
     if note not in notes:
         notes.append(note)
@@ -218,7 +219,7 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
         "command": shlex.join([
             *("poise", "replay", str(results.folder), "--trial", str(record.trial)),
             *("--controllers", record.controller, "--video", "trial.mp4"),
-            *allow_words(record.controller),
+            *allow_words(code_of(record.controller)),
         ]),
     }  # fmt: skip
 
