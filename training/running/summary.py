@@ -15,6 +15,7 @@ from .provenance import Circumstances
 from .trial_figures import (
     Bound,
     Counts,
+    GustFigures,
     InMotion,
     Interval,
     MotionLevel,
@@ -22,6 +23,7 @@ from .trial_figures import (
     PhaseJ50,
     Rate,
     ScenarioFigures,
+    SustainedFigures,
     WalkLevel,
 )
 
@@ -180,6 +182,8 @@ class Entry(Counts, EnvelopeFigures, Fractions, total=False):
     levels: list[RealismLevel]
     in_motion: list[InMotion]
     scenarios: list[ScenarioFigures]
+    sustained: list[SustainedFigures]
+    gusts: GustFigures
 
 
 class Paired(TypedDict, total=False):
