@@ -81,8 +81,8 @@ def parse_pushes(
 
     A push dictionary has the keys of `Push`, with exactly one magnitude among impulse [N·s],
     force [N], specific_impulse [N·s/kg], specific_force [N/kg] and ankle_fraction; a dictionary
-    with `delta_v` [m/s] is a kick. Left out, body is the root body, start 0 s, duration 0.1 s, direction 0°.
-    `margin(direction)` gives δ(θ) [m] for ankle_fraction.
+    with `delta_v` [m/s] is a kick. Left out, body is the root body, start 0 s, duration 0.1 s,
+    direction 0°. `margin(direction)` gives δ(θ) [m] for ankle_fraction.
 
     Raises ConfigError naming `source`, the field and the choices for an unknown key or body,
     a wrong type, a value out of range or not finite, and no or several magnitudes.
