@@ -29,11 +29,12 @@ from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
+from poise.envs.sensing.push_force import forget_pushes, push_force
 
 from .controlled import ControlledEnv
 from .policy_step import TargetInputs, set_targets
 from .scales import Lag, ResidualScales, action_term, make_residual
-from .terms import MOTION_TERMS, MotionView
+from .terms import FORCE_TERMS, ForceView, MotionView
 
 
 @runtime_checkable
@@ -93,7 +94,7 @@ class ResidualBalanceEnv(ControlledEnv):
 
     scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
     only_targets = True  #: the action moves targets and nothing else
-    known_terms = MOTION_TERMS
+    known_terms = FORCE_TERMS
 
     def __init__(
         self,
@@ -122,6 +123,7 @@ class ResidualBalanceEnv(ControlledEnv):
         limit, period = np.array(self.robot.torque_limit), self.config.policy_period
         self._residual = make_residual(self.residual, lag, period, momentum, limit)
         self._offsets = self._residual.offsets
+        self._push_force = push_force(self.robot.omega)
         with allowing(named(controller)):  # the user hands it over, not a file
             self.controller = self._known = load_controller(controller, self.robot)
         self._stand_in: Controller | None = None  # where state and robot are uncertain
@@ -195,6 +197,8 @@ class ResidualBalanceEnv(ControlledEnv):
         return mirror_terms(terms, parts)
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        if kind is ForceView:
+            return (self._push_force,)
         return (self._motion,) if kind is MotionView else super()._readings(kind)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
@@ -227,6 +231,7 @@ class ResidualBalanceEnv(ControlledEnv):
         self._motion.pace.clear()
         self._offsets[:] = 0.0
         self._residual.torques[:] = 0.0
+        forget_pushes(self._push_force)
         set_targets(self._target_inputs())
 
     def _target_inputs(self) -> TargetInputs:
@@ -239,6 +244,9 @@ class ResidualBalanceEnv(ControlledEnv):
                 motion=self._motion,
                 com_offset=self._com_offset,
                 residual=self._residual,
+                push=self._push_force,
+                observes_push=any(term.view is ForceView for term in self.terms),
+                period=float(self._base.period),
                 targets=self._targets,
             )
         return self._inputs

@@ -323,3 +323,23 @@ IN_MOTION = (
     Figure("over_standing", "over standing", ".2f", words="J50 in motion over J50 standing",
            ends="over_standing_ci95", bound="share50_bound"),
 )  # fmt: skip
+
+# of pushes that last, and of gusts
+HELD = (
+    TRIED[0],
+    Figure("never_fell_rate", "held", ".0%", words="trials without a fall",
+           ends="never_fell_ci95"),
+    Figure("f50", "F50", ".1f", "N", "largest force of a push that half of the trials hold",
+           ends="f50_ci95", bound="f50_bound"),
+    Figure("f50_per_mass", "F50/m", ".2f", "N/kg", "the same over the robot's mass"),
+    replace(RECOVERED, name="at rest again", words="fraction of all trials, at the end"),
+)  # fmt: skip
+GUSTS = (
+    TRIED[0],
+    Figure("never_fell_rate", "never fell", ".0%", words="trials without a fall",
+           ends="never_fell_ci95"),
+    Figure("survived_mean", "gusts survived", ".2f", words="mean over the trials",
+           ends="survived_ci95", of="pushes"),
+    Figure("first_survived", "the first", ".0f", words="trials that survive the first gust"),
+    HELD[-1],
+)  # fmt: skip

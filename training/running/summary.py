@@ -16,6 +16,7 @@ from .trial_figures import (
     Bound,
     Counts,
     Criterion,
+    GustFigures,
     InMotion,
     Interval,
     MotionLevel,
@@ -23,6 +24,7 @@ from .trial_figures import (
     PhaseJ50,
     Rate,
     ScenarioFigures,
+    SustainedFigures,
     WalkLevel,
 )
 
@@ -184,6 +186,8 @@ class Entry(Counts, EnvelopeFigures, Fractions, total=False):
     levels: list[RealismLevel]
     in_motion: list[InMotion]
     scenarios: list[ScenarioFigures]
+    sustained: list[SustainedFigures]
+    gusts: GustFigures
 
 
 class Paired(TypedDict, total=False):

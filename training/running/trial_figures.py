@@ -180,3 +180,24 @@ class ScenarioFigures(Counts):
 
     scenario: str
     speed_ahead: NotRequired[Number]
+
+
+class SustainedFigures(Counts):
+    """Pushes of seconds, of all profiles or of one. F50 [N] is the largest force of a push that
+    half of the trials hold without a fall."""
+
+    profile: str
+    f50: float
+    f50_ci95: Interval
+    f50_bound: Bound
+    f50_per_mass: float
+
+
+class GustFigures(Counts):
+    """Trials of `pushes` gusts at most: the mean number that is survived, and the trials that
+    survive the first one."""
+
+    pushes: int
+    survived_mean: float
+    survived_ci95: Interval
+    first_survived: int

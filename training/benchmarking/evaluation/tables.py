@@ -39,7 +39,7 @@ from poise.training.running.tables import figure_table
 from poise.training.running.terminal import BESIDE, in_parts
 from poise.training.running.trial_figures import NOT_FALLEN as CRITERION
 
-from .walk_tables import level_tables, motion_tables, scenario_tables, walk_tables
+from .walk_tables import lasting_tables, level_tables, motion_tables, scenario_tables, walk_tables
 
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
 SEPARATED = 0.05  # p below which the trials separate two controllers
@@ -120,7 +120,7 @@ def print_summary(summary: Summary, console: Console) -> None:
         for name, row in zip(names, zip(*(cells[h] for h in part), strict=True), strict=True):
             table.add_row(str(rank[name] or NONE), escape(name), *row)
         console.print(table)
-    special = walk_tables, motion_tables, level_tables, scenario_tables
+    special = walk_tables, motion_tables, level_tables, scenario_tables, lasting_tables
     for each in (table for tables in special for table in tables(summary)):
         console.print(each)
     if summary["pairs"]:

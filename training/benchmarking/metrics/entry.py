@@ -30,6 +30,7 @@ from poise.training.running.summary import (
 from poise.training.running.trial_figures import NOT_FALLEN, RECOVERED, ScenarioFigures
 
 from .factors import eurobench_figures, factor_figures
+from .lasting import gust_figures, sustained_figures
 from .motions import in_motion, motion_levels
 from .played import (
     DIRECTIONAL,
@@ -74,6 +75,10 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         entry["motions"], entry["in_motion"] = motions, in_motion(played)
     if scenarios := _scenarios(part(played, SCENARIOS)):
         entry["scenarios"] = scenarios
+    if sustained := part(played, "sustained"):
+        entry["sustained"] = sustained_figures(sustained, plan.limits.robot.mass)
+    if gusts := part(played, "gusts"):
+        entry["gusts"] = gust_figures(gusts)
     if random := part(played, "random"):
         entry.update(_fractions(random, plan.limits))
     if factors := factor_figures(part(played, "factors"), plan.standard):

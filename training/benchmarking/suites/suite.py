@@ -15,6 +15,7 @@ from .directions import Envelope, Grid, Margin
 from .draw import Part, Standard
 from .factors import Factors, Mix
 from .getting_up import GetUp
+from .lasting import Gusts, Sustained
 from .motions import Motions
 from .random import Quiet, Random, Sequence
 from .scenarios import Scenarios
@@ -37,6 +38,8 @@ class Suite(Standard):
     random: Random | None = None
     sequence: Sequence | None = None
     quiet: Quiet | None = None
+    sustained: Sustained | None = field(default=None, metadata={"omit": "default"})
+    gusts: Gusts | None = field(default=None, metadata={"omit": "default"})
     walk: Walk | None = field(default=None, metadata={"omit": "default"})
     gait: Gait | None = field(default=None, metadata={"omit": "default"})
     velocity: Velocity | None = field(default=None, metadata={"omit": "default"})
@@ -79,7 +82,8 @@ class Suite(Standard):
     @property
     def walks(self) -> bool:
         """True if it is for controllers that walk alone."""
-        return any(name in WALKING for name in self.parts)
+        commanded = (getattr(part, "command", None) for part in (self.sustained, self.gusts))
+        return any(name in WALKING for name in self.parts) or any(commanded)
 
     def performing(self, names: Many[str]) -> Suite:
         """The suite with other motions; raises ConfigError where none is performed."""
