@@ -49,9 +49,10 @@ $(STAMP): pyproject.toml constraints.txt
 test: setup
 	$(PYTHON) -m pytest -q $(PYTEST_WORKERS) $(PYTEST_ARGS)
 
-# The packaged clips, made again from their keyframes.
+# The packaged clips, made again from their keyframes, and from a walk.
 clips: setup
 	$(PYTHON) -m poise.training.motion.recording
+	$(PYTHON) -m poise.training.motion.recorded_walk
 
 # Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has. Of
 # that file torch alone is held, so that no other build of it is pulled.

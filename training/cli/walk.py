@@ -33,7 +33,7 @@ def walk(
     realism: str | None = None,
     video: Path | None = None,
     allow: Allow = (),
-) -> None:
+) -> int:
     """Walk at a commanded speed, pushed or not, and say how well: speed, steps, cost, falls.
 
     Args:
@@ -53,6 +53,9 @@ def walk(
         terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs, rise: 0.15}".
         realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
         video: an MP4 or WebP file to write.
+
+    Returns:
+        0 if the robot is upright at the end, 1 if it fell.
     """
     if not 0.0 < duration < math.inf:
         raise ConfigError(f"must be above 0 and finite, not {duration:g}", field="duration")
@@ -68,9 +71,11 @@ def walk(
     command = {"ahead": speed, "left": left, "turn": math.radians(turn), "step_time": step_time,
                "step_length": step_length, "width": width, "clearance": clearance,
                "arm_swing": arm_swing}  # fmt: skip
-    walk(command, duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
-         realism=realism, push=push, push_at=push_at, seed=seed, video=video, say=_say,
-         allow=allow)  # fmt: skip
+    outcome = walk(
+        command, duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
+        realism=realism, push=push, push_at=push_at, seed=seed, video=video, say=_say, allow=allow,
+    )  # fmt: skip
+    return 1 if outcome.fallen else 0
 
 
 def _terrain(text: str) -> str | dict[str, object]:

@@ -96,7 +96,7 @@ def follow(
     video: Path | None = None,
     size: tuple[int, int] = (640, 480),
     allow: Allow = (),
-) -> None:
+) -> int:
     """Perform a motion, pushed or not, and say how near the robot stayed to it.
 
     Args:
@@ -118,6 +118,9 @@ def follow(
             pressure, errors, tempo, and the timeline of a script's motion.
         video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost.
         size: of the video, width and height [pixels], even.
+
+    Returns:
+        0 if no trial fell, 1 if one did.
     """
     from poise.baselines.allowance import allowing
     from poise.training.benchmarking.trials.names import check_names
@@ -158,7 +161,7 @@ def follow(
             write_motion(synthesis, script, robot, Path(motion))
         if fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
-            return
+            return 0
         watched = Watched() if report is not None else None
         film = None if video is None else stack.enter_context(Film(video, size, watched))
         waits_so = Tempo(waits=True) if waits else None
@@ -176,3 +179,4 @@ def follow(
         print(video)
     if report is not None:
         print(report)
+    return 1 if any(trial.fallen for trial in trials) else 0
