@@ -77,6 +77,7 @@ def evaluate(
     write_limits: Path | None = None,
     motions: tuple[str, ...] = (),
     realism: str | None = None,
+    physics: str | None = None,
     overwrite: Overwrite = False,
     json: Json = False,
     allow: Allow = (),
@@ -107,11 +108,13 @@ def evaluate(
             .yaml files; its own if not given.
         realism: how real the robot is: ideal (its state is known exactly and at once), lab, field,
             or a .yaml file of a level; that of the suite if not given.
+        physics: the engine that steps the robot: mujoco, drake (needs poise[drake]), or a .yaml
+            file of its settings; that of the suite if not given.
     """
     from poise.configs.outputs import check_out_file
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite, realism=realism)
+    check_names(controllers, robot=robot, suite=suite, realism=realism, physics=physics)
     from poise.training.benchmarking.evaluation.evaluate import evaluate, measured_limits
 
     if write_limits is not None:
@@ -119,8 +122,8 @@ def evaluate(
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, limits=limits, motions=motions, realism=realism, overwrite=overwrite,
-        console=terminal(stderr=json), allow=allow,
+        trials=trials, limits=limits, motions=motions, realism=realism, physics=physics,
+        overwrite=overwrite, console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
@@ -142,6 +145,7 @@ def benchmark(
     backend: Backend = "local",
     trials: int | None = None,
     realism: str | None = None,
+    physics: str | None = None,
     overwrite: Overwrite = False,
     report: bool = True,
     submit: Path | None = None,
@@ -166,6 +170,7 @@ def benchmark(
         trials: at most as many in every cell of the suite, to try things out; of a suite of one
             part, its number.
         realism: ideal, lab, field or a .yaml file of a level; that of the suite if not given.
+        physics: mujoco, drake or a .yaml file of its settings; that of the suite if not given.
         report: write report.html at the end, as poise report does.
         submit: play nothing, but check this finished folder and pack it, without any code, into a
             .zip beside it: the issue form for results takes that.
@@ -185,13 +190,13 @@ def benchmark(
     from poise.baselines.allowance import named
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite, realism=realism)
+    check_names(controllers, robot=robot, suite=suite, realism=realism, physics=physics)
     from poise.training.benchmarking.evaluation.evaluate import benchmark
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, realism=realism, overwrite=overwrite, console=terminal(stderr=json),
-        allow=allow,
+        trials=trials, realism=realism, physics=physics, overwrite=overwrite,
+        console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     code = _raised(summary, out)
     if json:

@@ -39,10 +39,12 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
     """What all trials of a suite share, whose results are in `folder`."""
     chosen = suite.motions
     if chosen is None:
-        return Stage(robot, suite.duration, suite.noise)
+        return Stage(robot, suite.duration, suite.noise, physics=suite.physics)
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
-    return Stage(robot, LONGEST, suite.noise, ((STANDING, STANDING), *files), chosen.tempo)
+    return Stage(
+        robot, LONGEST, suite.noise, ((STANDING, STANDING), *files), chosen.tempo, suite.physics
+    )
 
 
 def motion_levels(played: Played) -> list[MotionLevel]:

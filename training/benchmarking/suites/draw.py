@@ -10,6 +10,7 @@ import numpy as np
 
 from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.balance.config import StartNoise
+from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.physics.pushes.options import check_body
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.physics.pushes.sampler import Range, push_bodies
@@ -36,6 +37,7 @@ class Standard:
     interval: float = field(default=1.0, metadata={"above": 0.0})  # between repeated pushes [s]
     body: str | None = None  # the robot's first push body
     realism: str = field(default=IDEAL, metadata={"omit": "default"})  # a level or a file of one
+    physics: str = field(default=MUJOCO, metadata={"omit": "default"})  # an engine, or its file
     noise: StartNoise = field(default_factory=StartNoise)
 
 
