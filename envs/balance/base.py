@@ -80,7 +80,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self.robot = on_terrain(known, self.config.terrain)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.policy_period)}
         self._set_up_rendering(self.robot.model, render_mode, width, height, camera)
-        self.estimator = self.config.estimator
+        self.estimator, self.physics = self.config.estimator, self.config.physics
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
         self.simulation = Simulation(self.robot)
         self.arrays: RobotArrays = self.simulation.arrays  #: of `robot`
@@ -277,6 +277,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     def check(self) -> None:
         """Raise what has gone wrong in the last compiled step: compiled code cannot raise."""
+        self.simulation.engine.check()
 
     def compiled_step(self) -> CompiledStep | None:
         """The compiled form of `advance`, if there is one; the same object while it can be used."""

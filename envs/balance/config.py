@@ -7,6 +7,7 @@ from pathlib import Path
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
+from poise.envs.physics.engines.config import Physics, load_physics
 from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.realism import Realism, load_realism
@@ -65,6 +66,7 @@ class EnvConfig:
         realism: How real sensors, motors, body and ground are: a level by name, file or fields.
         estimator: How the state is estimated where it is not known exactly.
         terrain: What the robot stands on.
+        physics: What engine steps the robot: a name, a file or fields.
         clip_action: Take actions beyond [-1, 1] as 1 or -1, instead of refusing them.
     """
 
@@ -81,6 +83,7 @@ class EnvConfig:
     realism: Realism = field(default_factory=Realism, metadata=OMIT)
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig, metadata=OMIT)
     terrain: Terrain = field(default_factory=Flat, metadata=OMIT)
+    physics: Physics = field(default_factory=Physics, metadata=OMIT)
     clip_action: bool = field(default=False, metadata=OMIT)
 
 
@@ -88,7 +91,7 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: obj
     """An EnvConfig from a .yaml file, a mapping or an object; `overrides` win.
 
     `terrain` may be the name of a kind alone, `realism` that of a level, `estimator` that of a
-    kind.
+    kind, `physics` that of an engine.
 
     Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
     that is no field.
@@ -116,6 +119,8 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: obj
     merged = {**fields, **overrides}
     if "realism" in merged:
         merged["realism"] = to_dict(load_realism(merged["realism"]))
+    if "physics" in merged:
+        merged["physics"] = to_dict(load_physics(merged["physics"]))
     if isinstance(merged.get("estimator"), str):
         merged["estimator"] = {"kind": merged["estimator"]}
     if isinstance(merged.get("terrain"), str):

@@ -78,6 +78,7 @@ def evaluate(
     motions: tuple[str, ...] = (),
     realism: str | None = None,
     get_up: bool = False,
+    physics: str | None = None,
     overwrite: Overwrite = False,
     json: Json = False,
     allow: Allow = (),
@@ -110,11 +111,13 @@ def evaluate(
             or a .yaml file of a level; that of the suite if not given.
         get_up: a robot that falls has 10 s to get up again: up again, and in what time, are
             figures of their own.
+        physics: the engine that steps the robot: mujoco, drake (needs poise[drake]), or a .yaml
+            file of its settings; that of the suite if not given.
     """
     from poise.configs.outputs import check_out_file
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite, realism=realism)
+    check_names(controllers, robot=robot, suite=suite, realism=realism, physics=physics)
     from poise.training.benchmarking.evaluation.evaluate import evaluate, measured_limits
 
     if write_limits is not None:
@@ -123,7 +126,7 @@ def evaluate(
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
         trials=trials, limits=limits, motions=motions, realism=realism, get_up=get_up,
-        overwrite=overwrite, console=terminal(stderr=json), allow=allow,
+        physics=physics, overwrite=overwrite, console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
@@ -145,6 +148,7 @@ def benchmark(
     backend: Backend = "local",
     trials: int | None = None,
     realism: str | None = None,
+    physics: str | None = None,
     overwrite: Overwrite = False,
     report: bool = True,
     submit: Path | None = None,
@@ -169,6 +173,7 @@ def benchmark(
         trials: at most as many in every cell of the suite, to try things out; of a suite of one
             part, its number.
         realism: ideal, lab, field or a .yaml file of a level; that of the suite if not given.
+        physics: mujoco, drake or a .yaml file of its settings; that of the suite if not given.
         report: write report.html at the end, as poise report does.
         submit: play nothing, but check this finished folder and pack it, without any code, into a
             .zip beside it: the issue form for results takes that.
@@ -188,13 +193,13 @@ def benchmark(
     from poise.baselines.allowance import named
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite, realism=realism)
+    check_names(controllers, robot=robot, suite=suite, realism=realism, physics=physics)
     from poise.training.benchmarking.evaluation.evaluate import benchmark
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, realism=realism, overwrite=overwrite, console=terminal(stderr=json),
-        allow=allow,
+        trials=trials, realism=realism, physics=physics, overwrite=overwrite,
+        console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     code = _raised(summary, out)
     if json:

@@ -260,9 +260,11 @@ class RobotFigures(TypedDict):
 
 
 class Summary(Circumstances):
-    """summary.json; `realism` is the level of a suite where that is not ideal."""
+    """summary.json; `realism` is the level of a suite where that is not ideal, `physics` the engine
+    where that is not MuJoCo."""
 
     realism: NotRequired[str]
+    physics: NotRequired[str]
     format: int
     suite: str
     seed: int

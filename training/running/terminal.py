@@ -107,7 +107,9 @@ class ProgressLines(Progress):
 
 def progress_bar(console: Console) -> Progress:
     """A bar, or lines, with trials, the time left and recovery rates (its field `rates`)."""
-    return _bar("trials", MofNCompleteColumn(), "not fallen, recovered: {task.fields[rates]}", console)
+    return _bar(
+        "trials", MofNCompleteColumn(), "not fallen, recovered: {task.fields[rates]}", console
+    )
 
 
 def steps_bar(label: str, console: Console | None = None) -> ProgressLines:

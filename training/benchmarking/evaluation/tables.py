@@ -103,7 +103,10 @@ def _value(entry: Entry, key: str) -> float:
 def print_summary(summary: Summary, console: Console) -> None:
     """Tables of the controllers and of the pairs, errors, a line per group of training seeds."""
     robot = summary["robot"]["name"]
-    title = escape(f"{summary['suite']} · {robot} · seed {summary['seed']}")
+    told = [summary["suite"], robot, f"seed {summary['seed']}"]
+    if "physics" in summary:
+        told.append(summary["physics"])
+    title = escape(" · ".join(told))
     cells = {
         heading: texts
         for heading, texts in table_cells(summary).items()

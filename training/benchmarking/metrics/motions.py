@@ -40,10 +40,11 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
     chosen = suite.motions
     if chosen is None:
         again = suite.get_up_time or (None if suite.get_up is None else 0.0)
-        return Stage(robot, suite.duration, suite.noise, get_up=again)
+        return Stage(robot, suite.duration, suite.noise, get_up=again, physics=suite.physics)
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
-    return Stage(robot, LONGEST, suite.noise, ((STANDING, STANDING), *files), chosen.tempo)
+    motions = ((STANDING, STANDING), *files)
+    return Stage(robot, LONGEST, suite.noise, motions, chosen.tempo, physics=suite.physics)
 
 
 def motion_levels(played: Played) -> list[MotionLevel]:

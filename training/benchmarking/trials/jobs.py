@@ -9,6 +9,7 @@ from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.tempo import Tempo
 from poise.envs.balance.config import StartNoise
+from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.motion.tracking.record import ANYWHERE
 
@@ -31,6 +32,7 @@ class Stage:
     tempo: Tempo = field(default_factory=Tempo)  #: at which they are played
     #: time after a fall in which the robot may get up [s]; None: a fall ends the trial
     get_up: float | None = None
+    physics: str = MUJOCO  #: engine that steps the robot, by its name or file
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
@@ -43,6 +45,8 @@ class Stage:
             given["fall"] = ANYWHERE
         if self.tempo.waits:
             given["tempo"] = self.tempo
+        if self.physics != MUJOCO:
+            given["physics"] = self.physics
         return load_agent(controller, robot, **given)
 
     def motion(self, name: str | None, robot: Robot | None = None) -> ReferenceMotion | None:

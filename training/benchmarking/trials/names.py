@@ -22,11 +22,12 @@ def check_names(
     suite: str | None = None,
     motion: str | None = None,
     realism: str | None = None,
+    physics: str | None = None,
 ) -> None:
     """Raise ConfigError, which lists what there is, for a name of nothing; see `check_name`."""
     if motion is not None and Path(motion).suffix == ".npz":  # a robot's motion
         motion = None
-    given = {"robots": robot, "suites": suite, "motions": motion}
+    given = {"robots": robot, "suites": suite, "motions": motion, "physics": physics}
     for kind, name in given.items():
         if name is not None:
             resolve(kind, name)

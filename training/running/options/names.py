@@ -16,6 +16,7 @@ KINDS = {
     "guards": "a recovery policy over a walker, where a CONTROLLER is named",
     "suites": "--suite",
     "realism": "--realism",
+    "physics": "--physics",
     "training": "poise train --config",
     "tuning": "poise tune --config",
     "motions": "--motion",
