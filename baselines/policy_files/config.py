@@ -41,6 +41,8 @@ class ObservationTerm:
         at_rest: what it shows in their place while no velocity is commanded, before `clip`.
         newest_first: whether the history begins with the newest step.
         lag: policy steps by which the newest one shown is old; 1: this step is left out.
+        ahead: policy steps by which the frames of a motion's term are ahead, side by side; negative
+            behind; empty: the present one.
         fill: what a history shows of the time before the first step: that step, or zeros.
     """
 
@@ -55,6 +57,7 @@ class ObservationTerm:
     at_rest: tuple[float, ...] | None = _new(None)
     newest_first: bool = _new(False)
     lag: int = _new(0, min=0, max=1000)
+    ahead: tuple[int, ...] = _new((), min=-1000, max=1000)
     fill: Literal["first", "zeros"] = _new("first")
 
     def __post_init__(self) -> None:
@@ -131,6 +134,28 @@ class Memory:
 
 
 @dataclass(frozen=True)
+class MotionConfig:
+    """The motion that a tracker follows.
+
+    Attributes:
+        clip: an .npz or .csv file, relative to the YAML file, see `read_clip`; "network": the
+            frames that the network gives for each `time_step`; empty: the default posture stands.
+        anchor: body whose pose the terms ``motion_anchor_…`` compare; empty: ``torso_link``, or the
+            root where the robot has no such body.
+        heading: what of the first frame is turned to face as the robot's anchor does: the anchor
+            or the root.
+        rate: of a .csv file [Hz]; 0: 30.
+        plays: whether the clip is played from a trial's begin on; else its first frame is held.
+    """
+
+    clip: str = ""
+    anchor: str = ""
+    heading: Literal["anchor", "root"] = "anchor"
+    rate: float = field(default=0.0, metadata={"min": 0.0, "max": 1000.0})
+    plays: bool = False
+
+
+@dataclass(frozen=True)
 class KnownFile:
     """A file of a policy that others publish: its size and SHA-256."""
 
@@ -201,6 +226,7 @@ class PolicyFileConfig:
         warm_up_with: what it is asked: the first observation, or zeros.
         history: of several steps, oldest first: each term's side by side ("term"), or all terms of
             a step side by side ("frame").
+        motion: what a tracker follows; None: nothing, or what stands where a term shows a motion.
         command: velocity that is asked for, forward and left [m/s], and turning left [rad/s],
             unless the environment commands one.
         phase: period of the clock that the terms ``phase``, ``phase_sin`` and ``phase_cos`` show
@@ -247,6 +273,7 @@ class PolicyFileConfig:
     batch: bool = _new(True)
     warm_up: int = _new(0, min=0, max=10_000)
     warm_up_with: Literal["first", "zeros"] = _new("first")
+    motion: MotionConfig | None = field(default=None, metadata={"omit": "default"})
     phase_offsets: tuple[float, ...] = _new((0.0, 0.5))
     phase_runs: Literal["always", "commanded"] = _new("always")
 

@@ -26,10 +26,13 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .config import PolicyFileConfig
+from .config import MotionConfig, PolicyFileConfig
 from .joints import JointServos, joint_servos
+from .motion.clips import read_clip, standing_clip
+from .motion.network import NETWORK, network_clip
+from .motion.track import MotionTrack
 from .networks import load_network
-from .observations import Observer, follows_commands
+from .observations import Observer, follows_commands, tracks_motion
 from .terms import Seen, roll_pitch
 
 
@@ -107,6 +110,7 @@ class PolicyFile(CompiledController):
         self._clock_start: float | None = None  # [s]; None: it stands
         self.network = load_network(Path(config.policy), config)
         self._check_sizes()
+        self.motion = self._motion(source=config.described_in)
         nj = len(self.joints.target)
         limit = np.zeros(nj)
         limit[self.arrays.motor_dofs - 6] = self.arrays.torque_limit
@@ -121,6 +125,23 @@ class PolicyFile(CompiledController):
 
     def __getstate__(self) -> dict[str, object]:
         return {**super().__getstate__(), "_tick": None}  # it holds an address
+
+    def _motion(self, source: str) -> MotionTrack | None:
+        """The motion that the terms show, if any does."""
+        config, robot, joints = self.config, self.robot, self.joints
+        if not tracks_motion(config):
+            return None
+        motion, period = config.motion or MotionConfig(), config.policy_period
+        names = [robot.joint_names[i] for i in joints.index]
+        if motion.clip == NETWORK:
+            clip = network_clip(self.network, robot, names, motion.anchor, period, source)
+        elif motion.clip:
+            clip = read_clip(motion.clip, robot, names, period, motion.rate)
+        else:
+            qpos = robot.standing_qpos.copy()
+            qpos[7 + joints.index] = joints.default
+            clip = standing_clip(robot, period, qpos)
+        return MotionTrack(robot, motion, clip, joints.index, joints.default, source)
 
     def _check_sizes(self) -> None:
         """Ask the network once, with zeros."""
@@ -148,6 +169,8 @@ class PolicyFile(CompiledController):
             self.orders[:] = 0.0
             self.orders[:3] = self.config.command
         self._clock_start = None
+        if self.motion is not None and state is not None:
+            self.motion.begin(state)
         for name in ("stiffness", "damping", "target"):
             getattr(self._servos, name)[:] = getattr(self.joints, name)
         self._servos.tau[:] = 0.0
@@ -163,8 +186,10 @@ class PolicyFile(CompiledController):
         phase = self._phase(now, bool(np.any(command)))
         seen = Seen(
             state, state.q[index], state.qvel[6:][index], self.joints.default, self.action,
-            command, phase, phase + self._legs,
+            command, phase, phase + self._legs, self.motion,
         )  # fmt: skip
+        if self.motion is not None:
+            self.motion.update(state, int(self._servos.ticks[0]) // self._servos.every)
         observations = self.observer.observe(seen)
         if not all(np.all(np.isfinite(each)) for each in observations.values()):
             return  # the simulation diverged, which is a fall

@@ -101,6 +101,25 @@ class OnnxNetwork:
     def __reduce__(self) -> tuple[object, ...]:
         return OnnxNetwork, (self.path, self.config), {"_memory": self._memory}
 
+    @property
+    def input_names(self) -> list[str]:
+        """All inputs of the file."""
+        return [each.name for each in self._session.get_inputs()]
+
+    @property
+    def output_names(self) -> list[str]:
+        """All outputs of the file."""
+        return [each.name for each in self._session.get_outputs()]
+
+    def frame(self, step: int, outputs: Sequence[str]) -> list[np.ndarray]:
+        """Outputs for the input `time_step`, zeros elsewhere; nothing is remembered."""
+        given = {each.name: np.zeros([size if isinstance(size, int) and size > 0 else 1
+                                      for size in each.shape], TYPES.get(each.type, np.float32))
+                 for each in self._session.get_inputs()}  # fmt: skip
+        given["time_step"][...] = step
+        return [np.asarray(each, dtype=float).ravel()
+                for each in self._session.run(list(outputs), given)]  # fmt: skip
+
     def reset(self) -> None:
         self._memory = {name: np.zeros_like(value) for name, value in self._memory.items()}
 

@@ -10,6 +10,7 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.description import match_names
 
 from .config import ObservationTerm
+from .motion.track import MOTION_ALIASES, MOTION_TERMS, MotionTrack, frames_ahead
 
 
 class Seen(NamedTuple):
@@ -23,6 +24,7 @@ class Seen(NamedTuple):
     command: np.ndarray  # (3,) [m/s, m/s, rad/s]
     phase: float  # of the clock [rad]
     legs: np.ndarray  # (l,) the phase of each leg [rad]
+    motion: MotionTrack | None = None  # that is followed
 
 
 def _turned(seen: Seen, vector: np.ndarray) -> np.ndarray:
@@ -102,6 +104,7 @@ ALIASES = {
     "action": "last_action",
     "actions": "last_action",
     "gait_phase": "phase",
+    **MOTION_ALIASES,
 }
 
 
@@ -132,16 +135,20 @@ class Term:
 
     def __init__(self, described: ObservationTerm, field: str, known: KnownTerms):
         self.described, self.name = described, meaning(described)
-        if self.name not in TERMS and self.name != CONSTANT:
+        moved = self.name in MOTION_TERMS
+        if self.name not in TERMS and self.name != CONSTANT and not moved:
             raise ConfigError(f"no such term: {shown(described.term)}", source=known.source,
                               field=f"{field}.term",
-                              choices=(*TERMS, CONSTANT, *ALIASES))  # fmt: skip
+                              choices=(*TERMS, *MOTION_TERMS, CONSTANT, *ALIASES))  # fmt: skip
         self._source, self._field = known.source, field
         self.values = np.array(described.values, dtype=float)
         names = known.joints.get(self.name, [])
         whole = len(self.values) if self.name == CONSTANT else known.sizes.get(self.name, 3)
         self.picked = self._picked(whole, names)
-        self.size = len(self.picked)
+        if described.ahead and not moved:
+            raise self._wrong("ahead", f"{described.term} is no term of a motion")
+        self._ahead = frames_ahead(described.ahead)
+        self.size = len(self.picked) * len(self._ahead)
         self.scale = self._scale([names[i] for i in self.picked] if names else [])
         self.at_rest = self._at_rest()
 
@@ -175,6 +182,8 @@ class Term:
                 raise self._wrong("scale", f"has nothing for {', '.join(lost)}")
             given = tuple(found[name] for name in names)
         scale = np.asarray(given, dtype=float)
+        if scale.size == len(self.picked) > 1:  # alike for all frames
+            scale = np.tile(scale, len(self._ahead))
         if scale.size not in (1, self.size):
             raise self._wrong("scale", f"has {scale.size} numbers, {self.described.term} has "
                               f"{self.size}")  # fmt: skip
@@ -212,6 +221,10 @@ class Term:
             value = self.at_rest
         elif self.name == CONSTANT:
             value = self.values[self.picked]
+        elif self.name in MOTION_TERMS:
+            assert seen.motion is not None
+            value = np.concatenate([MOTION_TERMS[self.name](seen.motion.frame(ahead))[self.picked]
+                                    for ahead in self._ahead])  # fmt: skip
         else:
             value = np.asarray(TERMS[self.name](seen), dtype=float)[self.picked]
         if self.described.clip is not None:

@@ -33,6 +33,8 @@ def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, object]
             fields[name] = numbers[0] if len(numbers) == 1 else numbers
     if "observation_names" in metadata:
         fields["observations"] = _terms(metadata, source)
+    if "anchor_body_name" in metadata:
+        fields["motion"] = {"anchor": metadata["anchor_body_name"], "clip": "network"}
     return fields
 
 
@@ -48,7 +50,10 @@ def _entries(text: str, field: str, source: Path) -> list[object]:
 
 def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
     names = metadata["observation_names"].split(",")
-    terms: list[dict[str, object]] = [{"term": RELATIVE.get(name, name)} for name in names]
+    # what tracks a motion is commanded that motion
+    tracking = "anchor_body_name" in metadata or any(map(_is_anchor, names))
+    renamed = {**RELATIVE, "command": "motion_command"} if tracking else RELATIVE
+    terms: list[dict[str, object]] = [{"term": renamed.get(name, name)} for name in names]
     for key, name in (("scale", "scale"), ("history_length", "history"), ("clip", "clip")):
         whole = f"observation_terms_{key}"
         if whole not in metadata:
@@ -66,6 +71,10 @@ def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
             else:
                 term[name] = values[0] if len(values) == 1 else values
     return terms
+
+
+def _is_anchor(name: str) -> bool:
+    return name.startswith(("motion_anchor", "motion_ref"))
 
 
 def _steps(values: tuple[float, ...], field: str, source: Path) -> int:

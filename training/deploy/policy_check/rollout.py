@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from poise.baselines.policy_files.controller import PolicyFile, observer_of
+from poise.baselines.policy_files.motion.track import MOTION_TERMS
 from poise.baselines.policy_files.networks import OnnxNetwork
 from poise.baselines.policy_files.terms import CLOCKS, COMMANDS, Place, Seen, meaning
 from poise.configs.archives import read_archive, read_arrays
@@ -17,7 +18,7 @@ CLOSE = 1e-3  # of an observation's numbers, which others compute in 32 bits fro
 SAME = 1e-4  # of actions from the same observations
 UNIT = 0.01  # of the length of a direction
 #: terms that a rollout does not tell: they follow what was commanded
-COMMANDED = (*COMMANDS, *CLOCKS)
+COMMANDED = (*COMMANDS, *CLOCKS, *MOTION_TERMS)
 
 
 @dataclass(frozen=True)
