@@ -6,8 +6,8 @@
 Robots with a packaged description are loaded by name, all others from their model alone
 (`poise.envs.robots.guess`). Each is refused in one line, or stands 20 s from an ordinary start with
 momentum-qp and is pushed on its trunk for 0.1 s: with momentum-qp, whose feet stay, and with
-capture-step, by bisection in four directions from one start each. The table goes to docs/log/fleet.md
-with `--write`.
+capture-step, by bisection in four directions from one start each. With `--write` the table goes to
+docs/log/fleet.md.
 """
 
 from __future__ import annotations
