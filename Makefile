@@ -11,7 +11,7 @@
 #              EXTRAS="zoo video" some of them alone, EXTRAS= none
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
-# make fleet   public humanoids of wheels: read, checked, stood and pushed; an hour; the table: docs/robots.md
+# make fleet   public humanoids of wheels: read, checked, stood and pushed; an hour; the table: docs/log/fleet.md
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
