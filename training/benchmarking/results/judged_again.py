@@ -31,14 +31,13 @@ def judged_again(
     Such a result counted walks as lost that stayed upright, but differed from their command by more
     than 0.05 m/s or 5°. Its columns say who fell: J50, the ranking and pairs are computed again
     from `lines` of trials.csv. The rate of `recovered` stays as it was judged, since older columns
-    have no error of the last strides. Figures over training seeds are left out. A `PoiseWarning`
-    says so, or why it could not be done.
+    have no error of the last strides. Figures over training seeds and over the limits of steps are
+    left out. A `PoiseWarning` says so, or why it could not be done.
     """
-    if all("criterion" in entry for entry in summary["controllers"].values()):
+    known = summary["controllers"].values()
+    if not any("walks" in entry and "criterion" not in entry for entry in known):
         return summary
     suite = build(Suite, settings.suite, str(folder / SETTINGS))
-    if not suite.walks:
-        return summary
     try:
         robot = load_robot(settings.robot)
         if robot.fingerprint != settings.robot_fingerprint:

@@ -61,7 +61,7 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         source=" ".join(summaries),
         first=summaries[first],
         j50=_pushed(entries),
-        older=[] if len(older) == len(names) else older,
+        older=older if len(older) < len(names) else [],
         by_falls=len(older) < len(names),
         ranking=_ranking(entries, names),
         commands={command: _walks(entries, names, command) for command in commands},
