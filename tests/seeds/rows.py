@@ -102,6 +102,11 @@ class Document:
     parts: tuple[Part, ...] = field(default_factory=tuple)
 
     @property
+    def anchor(self) -> str:
+        """Of its heading, as GitHub and the site make it."""
+        return re.sub(r"[^\w -]", "", f"{self.key}: {self.title}".lower()).replace(" ", "-")
+
+    @property
     def rows(self) -> list[Row]:
         """Of all parts."""
         return [row for part in self.parts for row in part.rows]
