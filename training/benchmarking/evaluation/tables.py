@@ -120,9 +120,9 @@ def print_summary(summary: Summary, console: Console) -> None:
 def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     """What the tables' words mean, of those that are there."""
     notes = []
-    if any(heading.startswith(HALF_AT.name) for heading in headings):
-        notes.append(f"{HALF_AT.name}: half of the pushes that are this fraction of the "
-                     f"{summary['scale']} are recovered; larger is better")  # fmt: skip
+    if (half := replace(HALF_AT, unit=f"× {summary['scale']}").heading) in headings:
+        notes.append(f"{half}: half of the pushes of this size are recovered, with the 95 % "
+                     "interval; larger is better")  # fmt: skip
     if STEPS_TAKEN.heading in headings:
         notes.append(f"{STEPS_TAKEN.heading}: of all trials, those that were lost too")
     of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
@@ -173,7 +173,7 @@ def table_cells(summary: Summary) -> dict[str, list[str]]:
     of_mix = f" of the {summary['rated']}" if summary["rated"] else ""
     figures = (
         *(J50_WORST, ETA_MEAN, ETA_WORST),
-        replace(HALF_AT, name=f"{HALF_AT.name}, of {summary['scale']}"),
+        replace(HALF_AT, unit=f"× {summary['scale']}"),
         replace(RECOVERED, name=f"{RECOVERED.name}{of_mix}"),
         *(NEVER_FELL, LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
     )

@@ -60,7 +60,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
     mix = f" of the {rated}" if rated else ""
     columns = (
         RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
-        replace(HALF_AT, words=f"half of the trials survive, of the {results.summary['scale']}"),
+        replace(HALF_AT, unit=f"× {results.summary['scale']}", words="half of the trials survive"),
         replace(RECOVERED, words=f"fraction of all trials{mix}"),
         replace(TRIED[0], words=f"that the rate is of{mix}"),
         *AGAINST, P_VALUE, FALLS[1], ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT,
