@@ -117,8 +117,9 @@ J50_BOUNDED = Figure("j50_bounded", "bounds", ".0f", words="directions where J50
 ETA_MEAN = Figure("eta_mean", "η mean", ".2f", words="J50 over the ankle limit, mean of all",
                   ends="eta_mean_ci95")  # fmt: skip
 ETA_WORST = Figure("eta_min", "η worst", ".2f", words="in the worst direction", csv="eta_worst")
-HALF_AT = Figure("fraction50", "half at", ".2f", words="half of the pushes of this fraction of the "
-                 "limit are recovered", bound="fraction50_bound")  # fmt: skip
+#: in units of what pushes are measured by, which whoever shows it names
+HALF_AT = Figure("fraction50", "J50", ".2f", "limit", "half of pushes of this size are recovered",
+                 ends="fraction50_ci95", bound="fraction50_bound")  # fmt: skip
 RECOVERED = Figure("recovered_rate", "recovered", ".0%", words="fraction of all trials",
                    ends="recovered_ci95")  # fmt: skip
 #: of a walk; the same key: whether the last strides are as near to the command as its own
@@ -225,7 +226,7 @@ GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", end
 AIMED = (
     J50,
     Figure("j90", "J90", ".1f", "N·s", ends="j90_ci95"),
-    replace(HALF_AT, ends="fraction50_ci95"),
+    HALF_AT,
     Figure("ankle_limit", "ankle limit", ".1f", "N·s"),
     Figure("eta", "η", ".2f"),
     *(

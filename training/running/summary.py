@@ -154,6 +154,7 @@ class Fractions(TypedDict, total=False):
 
     fraction_of: str
     fraction50: float
+    fraction50_ci95: Interval
     fraction50_bound: Bound
     sectors: list[Sector]
 

@@ -56,7 +56,10 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
         told.append((d.full_from, f"{d.full_motor} at its limit from {d.full_from:.2f} s, for "
                                   f"{d.full_time:.2f} s"))  # fmt: skip
     if d.failures_from is not None:
-        told.append((d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on"))
+        then = ", when it was falling already" if _fell_before(d) else ""
+        told.append(
+            (d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on{then}")
+        )
     if d.foothold is not None and d.foothold_time is not None:
         told.append((d.foothold_time, f"foothold {d.foothold} by {d.foothold_error:.2f} m at "
                                       f"{d.foothold_time:.2f} s"))  # fmt: skip
@@ -79,8 +82,10 @@ def cause(d: Diagnosis, steps: int) -> str:
     elif d.full_motor is not None:
         first = f"{SIDE.sub('', d.full_motor).strip('_')} at its limit"
     if d.failures_from is not None and d.failures_from <= (d.full_from or float("inf")):
-        first = "QP without a solution"
-    then = {0: "no step", 1: "one step was not enough"}.get(steps, "its steps were not enough")
+        first = first if _fell_before(d) else "QP without a solution"
+    then = {0: "no planned step", 1: "one step was not enough"}.get(
+        steps, "its steps were not enough"
+    )
     slipped = d.foothold == "slipped" and (d.foothold_time or 0.0) <= (d.capture_left or 0.0)
     if slipped or d.foothold == "missed":  # a sole that slips later is one of a robot that falls
         then = f"a foothold {d.foothold}"
@@ -89,6 +94,13 @@ def cause(d: Diagnosis, steps: int) -> str:
     if d.loss == "off command":
         then = "left its command"
     return f"{first}, then {then}"
+
+
+def _fell_before(d: Diagnosis) -> bool:
+    """Whether the capture point had left the support for good when the QP first failed: no torques
+    then bring it back, and a foot that tilts or lifts leaves the QP without the forces that it
+    needs. The failure is a consequence of the fall, not its cause."""
+    return d.failures_from is not None and (d.capture_left or float("inf")) <= d.failures_from
 
 
 def losses(lost: Iterable[tuple[Diagnosis, int]]) -> list[Loss]:

@@ -75,7 +75,7 @@ def draw_plots(
     else:
         fits = {name: sectors(own) for name, own in shown.items()}
         fraction = {name: fractions(own) for name, own in shown.items()}
-        unit = f"of the {limits.scale}"
+        unit = f"× {limits.scale}"
         title = f"Recovered fraction of the {limits.scale} by push direction"
         polar_envelope(polar, _series(fits), title=title, unit=unit, note=_left_out(fits))
         label = f"push impulse, as a fraction of the {limits.scale}"

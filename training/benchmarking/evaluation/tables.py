@@ -138,9 +138,9 @@ def print_summary(summary: Summary, console: Console) -> None:
 def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     """What the tables' words mean, of those that are there."""
     notes = []
-    if any(heading.startswith(HALF_AT.name) for heading in headings):
-        notes.append(f"{HALF_AT.name}: half of the pushes that are this fraction of the "
-                     f"{summary['scale']} are recovered; larger is better")  # fmt: skip
+    if (half := replace(HALF_AT, unit=f"× {summary['scale']}").heading) in headings:
+        notes.append(f"{half}: half of the pushes of this size are recovered, with the 95 % "
+                     "interval; larger is better")  # fmt: skip
     if walked(summary["controllers"]):
         notes.append(f"J50, the order and pairs of walks are by falls; {NOT_FALLEN.name} is of the "
                      f"pushes that all meet; {AS_COMMANDED.name}: the last two strides are as near "
@@ -200,7 +200,7 @@ def table_cells(summary: Summary) -> dict[str, list[str]]:
         rates = (NOT_FALLEN, AS_COMMANDED)
     figures = (
         *(J50_WORST, ETA_MEAN, ETA_WORST),
-        replace(HALF_AT, name=f"{HALF_AT.name}, of {summary['scale']}"),
+        replace(HALF_AT, unit=f"× {summary['scale']}"),
         *rates,
         *UP_AGAIN,
         *(LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),

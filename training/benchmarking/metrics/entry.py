@@ -10,7 +10,6 @@ from poise.training.benchmarking.diagnosis.words import losses
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
 from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.statistics.eurobench import HUMAN_COM_HEIGHT
-from poise.training.benchmarking.statistics.fits import fit_logistic
 from poise.training.benchmarking.statistics.rates import eta
 from poise.training.benchmarking.suites.plan import Plan, at_level
 from poise.training.benchmarking.suites.scenarios import PART as SCENARIOS
@@ -136,15 +135,17 @@ def envelope(
 
 
 def _fractions(played: Played, limits: PushLimits) -> Fractions:
-    fit, by_sector = fit_logistic(fractions(played), won(played)), sectors(played)
+    together = mean_over_directions(np.zeros(len(played)), fractions(played), won(played))
+    (one,), by_sector = together.fits, sectors(played)
     found = [
         {"direction": angle, **fitted(f, "fraction50")}
         for angle, f in zip(by_sector.directions, by_sector.fits, strict=True)
     ]
     return {
         "fraction_of": limits.scale,
-        "fraction50": fit.j50,
-        "fraction50_bound": fit.bound,
+        "fraction50": one.fit.j50,
+        "fraction50_ci95": one.j50_ci,
+        "fraction50_bound": one.fit.bound,
         "sectors": cast(list[Sector], found),
     }
 

@@ -16,7 +16,7 @@ from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis, diagnose
-from poise.training.benchmarking.diagnosis.record import CourseRecord
+from poise.training.benchmarking.diagnosis.record import CourseRecord, swing_of
 from poise.training.motion.tracking.record import Tracking
 
 from .agents import Agent
@@ -89,7 +89,7 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
         for each in watches:
             each(env)
         action = stepped.step()
-        touchdowns.update(env.simulation.state.contacts)
+        touchdowns.update(env.simulation.state.contacts, swing_of(env))
         settled.update(env, action)
     for each in watches:
         each(env)
@@ -323,6 +323,8 @@ def _finite(value: float) -> float | None:
 class Touchdowns:
     """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
 
+    Where the controller has a plan, those alone that it planned: a foot that it swung meanwhile.
+
     Args:
         feet: number of feet.
         period: seconds between two calls of `update`.
@@ -332,9 +334,13 @@ class Touchdowns:
         self.count = 0
         self._least = max(round(AIR_TIME / period), 1)
         self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
+        self._planned = np.zeros(feet, dtype=bool)  # whether the foot swung by plan in these
 
-    def update(self, contacts: np.ndarray) -> None:
-        """(feet,) 1 where a foot touches the ground, else 0."""
+    def update(self, contacts: np.ndarray, swinging: int | None = None) -> None:
+        """Take (feet,) 1 where a foot touches the ground, else 0, and `swing_of` the controller."""
         down = contacts > 0.5
-        self.count += int(np.sum(down & (self._air >= self._least)))
+        swung = swinging is None or np.arange(len(down)) == swinging
+        self._planned |= ~down & swung
+        self.count += int(np.sum(down & self._planned & (self._air >= self._least)))
+        self._planned &= ~down
         self._air = np.where(down, 0, self._air + 1)

@@ -96,7 +96,9 @@ class TrialFigures:
     recovery_time: float | None = None
     #: a foot moved more than 5 cm; the column `stepped` of trials.csv
     foot_displaced: bool = False
-    steps: int = 0  #: touchdowns of feet that were in the air for 0.08 s
+    #: touchdowns of feet that were in the air for 0.08 s; of a controller that plans its steps, or
+    #: keeps its feet where they are, those that it planned
+    steps: int = 0
     max_com: float | None = None  #: largest distance of the CoM from the soles' centre
     max_capture: float | None = None  #: the same of the capture point
     min_cop_margin: float | None = None  #: smallest distance of the CoP from the support's edge

@@ -154,7 +154,7 @@ def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]
             (part, name, *found, *wilson_interval(*found[1:]), fit.j50, fit.bound, fit.scale)
             for found in trial_bins(*trials[name], BINS)
         ]
-    told = "; ".join(f"{name} {'half at' if fit.bound is None else 'only a bound,'} {fit.j50:.2f}"
+    told = "; ".join(f"{name} {'J50' if fit.bound is None else 'J50, only a bound,'} {fit.j50:.2f}"
                      for name, fit in fits.items())  # fmt: skip
     lost = "fallen" if part == WALK_PUSH else "not recovered"
     out = Inline(f"Fraction of trials {lost}, over the {title}: {told}.")
@@ -183,6 +183,6 @@ def _envelopes(
         for name, entries in own.items()
     ]
     if not measured:
-        return f"of the {results.summary['scale']}", found, None
+        return f"× {results.summary['scale']}", found, None
     angles, limit = zip(*results.summary["robot"]["ankle_limit"], strict=True)
     return "N·s", found, (angles, limit)

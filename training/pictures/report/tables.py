@@ -62,7 +62,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
     rates = (NOT_FALLEN, AS_COMMANDED) if walked(entries) else (RECOVERED, NOT_FALLEN)
     columns = (
         RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
-        replace(HALF_AT, words=f"half of the trials survive, of the {results.summary['scale']}"),
+        replace(HALF_AT, unit=f"× {results.summary['scale']}", words="half of the trials survive"),
         *(replace(each, words=f"{each.words}{mix}") for each in rates),
         replace(TRIED[0], words=f"that the rate is of{mix}"),
         *AGAINST, P_VALUE, ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT,

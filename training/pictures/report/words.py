@@ -3,10 +3,15 @@
 import math
 
 from poise.training.benchmarking.diagnosis.words import towards
-from poise.training.benchmarking.evaluation.tables import assisted, places, walked
+from poise.training.benchmarking.evaluation.tables import (
+    SEPARATED,
+    assisted,
+    places,
+    walked,
+)
 from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.running.summary import both_ends
+from poise.training.running.summary import Summary, both_ends
 
 from .cells import number_text
 
@@ -22,7 +27,11 @@ def lead(results: Results) -> list[str]:
     what = "random trials" if summary["rated"] else "trials"
     ranks = places(summary["controllers"])
     tied = [name for name in fair if ranks[name] == 1 and name != first]
-    place = f"ties with {' and '.join(tied)} for the first place" if tied else "comes first"
+    place = "comes first"
+    if tied:
+        place = f"ties with {' and '.join(tied)} for the first place"
+    elif len(fair) > 1 and (doubt := _not_separated(summary, first, fair[1])):
+        place = doubt
     rate, tried = best["recovered_rate"], f"{best['trials']} {what}"
     upright = best.get("never_fell_rate")
     if upright is None:
@@ -38,10 +47,27 @@ def lead(results: Results) -> list[str]:
         fell = walked(summary["controllers"])
         text = f"{'It falls in half' if fell else 'Half'} of its trials"
         text += f"{'' if fell else ' are recovered'} at {best['j50_mean']:.1f} N·s"
-        text += f" ({around[0]:.1f} to {around[1]:.1f})" if around else ""
+        text += f" (95 % {around[0]:.1f} to {around[1]:.1f})" if around else ""
         text += f": {best['eta_mean']:.2f} of the ankle limit, {best['eta_min']:.2f} in the worst"
         said.append(text + " direction, over all directions.")
     return said
+
+
+def _not_separated(summary: Summary, first: str, second: str) -> str:
+    """How far the trials tell the first two apart; empty where they do.
+
+    By the interval of the gain in J50 where controllers are ranked by that, else by McNemar's test.
+    """
+    pairs = [pair for pair in summary["pairs"] if {pair["a"], pair["b"]} == {first, second}]
+    if not pairs:
+        return f"is listed first, not compared with {second} on the same trials"
+    pair = pairs[0]
+    words = f"is listed first, not separated from {second}"
+    if ends := both_ends(pair.get("j50_gain_ci95")):
+        low, high = (100.0 * end for end in ends)
+        return "" if low * high > 0.0 else f"{words} (gain in J50 {low:+.1f} to {high:+.1f} %)"
+    p = pair.get("p_mcnemar", 1.0)
+    return "" if p < SEPARATED else f"{words} (McNemar p = {p:.2f})"
 
 
 def push_text(record: Record, trial: Trial) -> str:
