@@ -16,7 +16,7 @@ from poise.baselines.policy_files.motion.network import network_clip
 from poise.baselines.policy_files.networks import load_network
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
-from tests.support.policies import helper, write_graph
+from tests.support.policies import within
 from tests.support.shared import robot
 
 PERIOD, COUNT = 0.02, 11
@@ -163,24 +163,6 @@ def test_what_stands_is_as_high_as_standing() -> None:
     assert abs(clip.qpos[0, 2] - BODY.standing_qpos[2]) > 1e-4
 
 
-def within(path: Path, **outputs: np.ndarray) -> Path:
-    """A network that gives rows of these arrays by `time_step`, the last one beyond them."""
-    last = np.array([len(next(iter(outputs.values()))) - 1], np.float32)
-    weights = {"last": last, "W": np.zeros((4, N), np.float32)}
-    nodes = [helper.make_node("Min", ["time_step", "last"], ["low"]),
-             helper.make_node("Cast", ["low"], ["index"], to=7),
-             helper.make_node("MatMul", ["obs", "W"], ["actions"])]  # fmt: skip
-    ends = [("actions", [1, N], 1)]
-    for name, rows in outputs.items():
-        weights[f"all_{name}"] = rows.astype(np.float32)
-        nodes.append(helper.make_node("Gather", [f"all_{name}", "index"], [f"two_{name}"], axis=0))
-        weights.setdefault("ones", np.array([0]))
-        nodes.append(helper.make_node("Squeeze", [f"two_{name}", "ones"], [name]))
-        ends.append((name, [1, *rows.shape[1:]], 1))
-    inputs: list[Any] = [("obs", [1, 4], 1), ("time_step", [1, 1], 1)]
-    return write_graph(path, nodes, weights, inputs, ends)
-
-
 CONFIG: dict[str, Any] = {"obs": ({"term": "constant"},), "time_step": ({"term": "time_step"},)}
 
 
@@ -200,14 +182,14 @@ def test_a_clip_within_a_network(tmp_path: Path, anchor: bool) -> None:
         quat = turn.as_quat()[:, [3, 0, 1, 2]]
         given["body_pos_w"] = np.stack([root, root + 1.0], axis=1)
         given["body_quat_w"] = np.stack([quat, quat[::-1]], axis=1)
-    path = within(tmp_path / "p.onnx", **given)
+    path = within(tmp_path / "p.onnx", 4, **given)
     network = load_network(path, PolicyFileConfig(observations=CONFIG))
     check(network_clip(network, BODY, NAMES, name, PERIOD, "own.yaml"))
 
 
 def test_a_network_without_a_clip(tmp_path: Path) -> None:
     """The field, and what to do."""
-    path = within(tmp_path / "p.onnx", joint_pos=moving(50.0)[2])
+    path = within(tmp_path / "p.onnx", 4, joint_pos=moving(50.0)[2])
     network = load_network(path, PolicyFileConfig(observations=CONFIG))
     with pytest.raises(ConfigError, match="motion.clip: the network holds no clip"):
         network_clip(network, BODY, NAMES, "", PERIOD, "own.yaml")
