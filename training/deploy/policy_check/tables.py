@@ -7,6 +7,7 @@ from rich.console import Console
 from poise.baselines.allowance import is_script
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.known import PLACES, Known, find_network, how_to_get, places
+from poise.baselines.policy_files.refused import refused_families
 from poise.training.running.tables import text_table
 
 from .check import PolicyCheck
@@ -44,6 +45,8 @@ def print_policies(known: list[Known], console: Console) -> None:
                   "the projects here or beside the repository, and in ../shared/rivals: "
                   f"{', '.join(looked) or 'none of them is there'}",
                   markup=False, highlight=False)  # fmt: skip
+    for name, refused in refused_families().items():
+        console.print(f"{name}: not described: {refused}", markup=False, highlight=False)
     for each in missing:
         name, file = next(iter(each.origin.files.items()))
         path = f"{each.origin.folder}/{name}" if each.origin.folder else name
