@@ -101,8 +101,9 @@ def follow(
 
     Args:
         motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
-            motion is made first: a .motion file, the name of a packaged one, or its text.
-        controller: as in poise evaluate.
+            motion is made first: a .motion file, the name of a packaged one, or its text. For a
+            tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1.
+        controller: as in poise evaluate; a policy from outside that tracks motions follows clips.
         starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
             at each tempo of --fastest.
         push: impulse of a push at a random time of the motion [N s]; 0 for none.
@@ -126,11 +127,14 @@ def follow(
     from poise.training.benchmarking.trials.names import check_names
 
     script = find_script(motion) if names_script(motion) else None
-    check_names([controller], robot=robot, motion=None if script else motion)
+    is_clip = Path(motion).suffix in (".npz", ".csv")
+    check_names([controller], robot=robot, motion=None if script or is_clip else motion)
     from poise.baselines.balance.references.tempo import Tempo
+    from poise.training.benchmarking.trials.push_limits import load_limits
     from poise.training.motion.following.fastest import STARTS, find_fastest
     from poise.training.motion.following.follow import follow as perform
     from poise.training.motion.following.tables import print_followed
+    from poise.training.motion.following.tracked import follow_clip, following, tracker_config
     from poise.training.pictures.figures.encoder import check_video
     from poise.training.pictures.figures.playback import check_size
     from poise.training.pictures.motion_report.film import Film
@@ -159,6 +163,26 @@ def follow(
             folder = stack.enter_context(TemporaryDirectory(prefix="poise-"))
             motion = str(Path(folder) / f"{Path(script.source).stem}.npz")
             write_motion(synthesis, script, robot, Path(motion))
+        tracker = tracker_config(controller)
+        if tracker is not None:
+            if fastest or waits or tempo != 1.0 or report or video:
+                raise ConfigError("a tracker follows its clip at the clip's own pace: not with "
+                                  "--tempo, --waits, --fastest, --report, --video",
+                                  source=controller, field="controller")  # fmt: skip
+            if push and share:
+                raise ConfigError("give either an impulse or a share of J50", field="share")
+            body = load_robot(robot)
+            half = load_limits(body).j50() if share else None
+            size = (lambda direction: share * half(direction)) if half else lambda direction: push
+            tracked = follow_clip(following(tracker, motion), body,
+                                  starts=20 if starts is None else starts, pushed=size,
+                                  directions=directions, seed=seed, realism=realism)  # fmt: skip
+            print_followed(tracked, f"{Path(motion).stem} by {controller} on {robot}, {pushed}",
+                           terminal())  # fmt: skip
+            if out is not None:
+                write_atomic(out, json.dumps([asdict(each) for each in tracked], indent=1) + "\n")
+                print(out)
+            return
         if fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return 0

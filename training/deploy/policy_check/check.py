@@ -9,6 +9,7 @@ from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.known import known_policies
 from poise.baselines.policy_files.networks import onnx_session
+from poise.baselines.policy_files.observations import tracks_motion
 from poise.baselines.policy_files.onnx.files import BYTES, digest, is_network
 from poise.baselines.policy_files.onnx.metadata import metadata_fields
 from poise.baselines.registry import controller_config
@@ -43,6 +44,7 @@ class PolicyCheck:
         findings: what a rollout tells.
         tried: readings of what the description leaves open, where it fell or was never at rest.
         proposed: the one of them that stood best, better than what is described; or None.
+        held: whether it tracks a motion whose first frame is held.
         amends: whether the description does not fit the network without the proposal.
     """
 
@@ -56,6 +58,7 @@ class PolicyCheck:
     tried: tuple[Tried, ...] = ()
     proposed: Tried | None = None
     amends: bool = False
+    held: bool = False
 
     @property
     def right(self) -> bool:
@@ -99,7 +102,12 @@ def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> Policy
             tried += try_clocks(robot, config)
         proposed = _better(tried, stood)
     return PolicyCheck(file, known, sizes, (), _unsaid(config), stood, tuple(findings),
-                       tuple(tried), proposed, steps > 1)  # fmt: skip
+                       tuple(tried), proposed, steps > 1, _holds(config))  # fmt: skip
+
+
+def _holds(config: PolicyFileConfig) -> bool:
+    """Return whether a policy tracks a motion whose first frame is held."""
+    return tracks_motion(config) and not (config.motion is not None and config.motion.plays)
 
 
 def known_as(path: Path) -> str | None:

@@ -7,6 +7,7 @@ from rich.console import Console
 from poise.baselines.allowance import is_script
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.known import PLACES, Known, find_network, how_to_get, places
+from poise.baselines.policy_files.refused import refused_families
 from poise.training.running.tables import text_table
 
 from .check import PolicyCheck
@@ -44,6 +45,8 @@ def print_policies(known: list[Known], console: Console) -> None:
                   "the projects here or beside the repository, and in ../shared/rivals: "
                   f"{', '.join(looked) or 'none of them is there'}",
                   markup=False, highlight=False)  # fmt: skip
+    for name, refused in refused_families().items():
+        console.print(f"{name}: not described: {refused}", markup=False, highlight=False)
     for each in missing:
         name, file = next(iter(each.origin.files.items()))
         path = f"{each.origin.folder}/{name}" if each.origin.folder else name
@@ -62,6 +65,11 @@ def print_check(check: PolicyCheck, console: Console) -> None:
     say(f"{check.file}: takes {sides[0]}; gives {sides[1]}")
     if check.known is not None:
         say(f"it is {check.known}, a known policy: that name plays it, too")
+    if check.sizes.gives_clip:
+        say("it tracks a motion, whose frames it gives for each time_step: motion: {clip: network}")
+    if check.held:
+        say("it tracks a motion, of which the first frame is held here: poise motion follow CLIP "
+            f"--controller {check.known or check.file} plays one")  # fmt: skip
     if check.stood is None:
         _say_missing(check, say)
         return
@@ -118,6 +126,8 @@ def _skeleton(check: PolicyCheck) -> str:
     """A description with places to fill in."""
     lines = ["kind: policy-file", f"policy: {check.file.rpartition('/')[2]}"]
     lines += [f"{name}: ...  # {WORDS[name]}" for name in check.unsaid if name != "observations"]
+    if check.sizes.gives_clip:
+        lines.append("motion: {clip: network}")
     lines.append("observations:")
     for layout in check.layouts[:1]:
         names = [name for term in layout.terms for name in term.split(", ")]

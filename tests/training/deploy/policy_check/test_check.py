@@ -24,7 +24,7 @@ from poise.training.deploy.policy_check import check as checking
 from poise.training.deploy.policy_check.check import Stood, check_policy
 from poise.training.deploy.policy_check.guess import layouts
 from poise.training.deploy.policy_check.rollout import Finding, compare
-from tests.support.policies import linear, write_onnx, write_yaml
+from tests.support.policies import linear, within, write_onnx, write_yaml
 from tests.support.shared import robot
 
 N = 25  # joints of `compact`
@@ -66,6 +66,33 @@ def test_a_bare_network_is_told_what_it_lacks(
     assert "perhaps 336 = 4 × 84: a history of 4 steps of base_ang_vel 3" in text.replace("\n", " ")
     assert "default_dof_pos" in text and "stiffness:" not in text and "damping: kd, kds" in text
     assert "- {term: joint_vel, history: 4}" in text
+
+
+@pytest.mark.parametrize(
+    ("size", "parts"),
+    [
+        (154, ("motion_command 58", "motion_anchor_ori_b 6 + base_ang_vel 3")),
+        (160, ("motion_anchor_pos_b 3 + motion_anchor_ori_b 6 + base_lin_vel 3",)),
+    ],
+)
+def test_trackers_are_guessed(size: int, parts: tuple[str, ...]) -> None:
+    """BeyondMimic's observation, without and with what only an estimator knows."""
+    text = str(next(layouts(size, 29, 29)))
+    assert all(part in text for part in parts), text
+
+
+def test_a_network_with_a_clip_is_a_tracker(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the names of its inputs and outputs; the description to begin with says so."""
+    outputs = {"joint_pos": np.zeros((3, N)), "joint_vel": np.zeros((3, N)),
+               "body_pos_w": np.zeros((3, 2, 3)), "body_quat_w": np.zeros((3, 2, 4))}  # fmt: skip
+    path = within(tmp_path / "net.onnx", 5 * N + 9, **outputs)
+    assert main(["policies", "check", str(path), "--robot", "compact"]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "it tracks a motion, whose frames it gives for each time_step" in text
+    assert "perhaps 134 = motion_command 50 + motion_anchor_ori_b 6" in text
+    assert "motion: {clip: network} observations: - {term: motion_command}" in text
 
 
 def test_a_bare_script_is_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
