@@ -11,7 +11,7 @@ import pytest
 
 from tests.integration.test_docs import folder, parsed  # noqa: F401
 from tests.seeds.page import PAGE, page_of
-from tests.seeds.rows import ROOT, STATES, Document, Figure, Row, load_documents
+from tests.seeds.rows import ROOT, STATES, Document, Figure, load_documents
 from tests.seeds.running import faults, prepare, run_alone, run_here, runs_of
 
 DOCUMENTS = load_documents()

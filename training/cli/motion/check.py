@@ -101,7 +101,7 @@ def follow(
 
     Args:
         motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
-            motion is made first: a .motion file, the name of a packaged one, or its text.
+            motion is made first: a .motion or .csv file, the name of a packaged one, or its text.
         controller: as in poise evaluate.
         starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
             at each tempo of --fastest.
