@@ -52,7 +52,7 @@ test: setup
 # The packaged clips, made again from their keyframes, and from a walk.
 clips: setup
 	$(PYTHON) -m poise.training.motion.recording
-	$(PYTHON) -m poise.training.motion.recorded_walk
+	$(PYTHON) -m poise.training.motion.gaits.recorded_walk
 
 # Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has. Of
 # that file torch alone is held, so that no other build of it is pulled.

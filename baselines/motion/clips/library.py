@@ -18,7 +18,7 @@ def packaged_clips() -> list[str]:
 
 def walking_clips() -> list[str]:
     """Names of the packaged BVH files of walks, which a controller walked in the simulation, of the
-    same skeleton: for motion matching (`poise.training.motion.recorded_walk`)."""
+    same skeleton: for motion matching (`poise.training.motion.gaits.recorded_walk`)."""
     return sorted(path.stem for path in (packaged_folder("clips") / "walks").glob("*.bvh"))
 
 

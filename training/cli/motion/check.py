@@ -101,8 +101,8 @@ def follow(
 
     Args:
         motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
-            motion is made first: a .motion file, the name of a packaged one, or its text. For a
-            tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1.
+            motion is made first: a .motion or .csv file, the name of a packaged one, or its text.
+            For a tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1.
         controller: as in poise evaluate; a policy from outside that tracks motions follows clips.
         starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
             at each tempo of --fastest.

@@ -1,6 +1,6 @@
-"""The packaged clip of walks: `python -m poise.training.motion.recorded_walk [FILE]` makes it.
+"""The packaged clip of walks, for motion matching: `python -m` this file, [FILE], makes it again.
 
-It is what a controller walks in the simulation at commands that change, for motion matching.
+It is what a controller walks in the simulation at commands that change.
 """
 
 import sys
@@ -15,7 +15,7 @@ from poise.configs.files import packaged_folder
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.trials.agents import load_agent
 
-from .recording import clip_of
+from ..recording import clip_of
 
 NAME, CONTROLLER = "humanoid_gaits", "walk-fast"
 RATE = 1.0 / 30.0  # [s]
