@@ -54,7 +54,7 @@ FLOORS = """
 20 training/benchmarking/evaluation
 21 training/benchmarking/results, training/motion/gaits
 22 training/deploy/export, training/pictures/report, training/pictures/sessions
-23 training, training/pictures/motion_report, training/pictures/view
+23 training, training/pictures/gallery, training/pictures/motion_report, training/pictures/view
 24 training/cli/motion
 25 training/cli
 """

@@ -20,7 +20,7 @@ from poise.training.running.options.arguments import (
 from poise.training.running.terminal import terminal
 
 from .policies import dataset, export
-from .results import compare, leaderboard, replay, report
+from .results import compare, gallery, leaderboard, replay, report
 from .view import view
 from .walk import gait, walk
 
@@ -387,6 +387,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "view": view,
     "replay": replay,
     "report": report,
+    "gallery": gallery,
     "tune": tune,
     "qp-set": qp_set,
     "export": export,
