@@ -60,6 +60,11 @@ class ResidualBalanceEnv(ControlledEnv):
     | 2 | cop_x | `residual.cop`, 0.15 m | CoP target, forward |
     | 3 | cop_y | `residual.cop`, 0.15 m | CoP target, left |
 
+    With the feet fixed, CoM targets gain for pushes that last and for gusts from one side; the CoP
+    target changes next to nothing at the packaged gains: at rest the CoP is below the CoM, whatever
+    is asked of it, and in between it is the CoM's law that decides. A `residual.cop` of 0 leaves
+    both entries out.
+
     Scales above 0 for `residual.height` [m] and `residual.lean` [rad] append `com_z` (the CoM's
     height) and `lean_x`, `lean_y` (a rotation of the root's target about the axes x and y); one for
     `residual.momentum` [m h² ω] appends `momentum_x` and `momentum_y`, angular momentum that the
@@ -72,7 +77,8 @@ class ResidualBalanceEnv(ControlledEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is that of `motion`.
+    It does not know the push. `observation: {extra: [push_force, push_mean]}` adds the force that
+    is estimated from CoM and CoP, and its leaky mean. The reference is that of `motion`.
 
     A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the
     option "command" of `reset` sets it from the start on: a mapping with `ahead`, `left` [m/s] and

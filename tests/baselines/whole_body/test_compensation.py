@@ -169,3 +169,25 @@ def test_it_belongs_to_the_standing_qp():
     data = {"base": "capture-step", "step_qp": {"compensation": {}}}
     with pytest.raises(ConfigError, match=r"step_qp\.compensation"):
         ResidualStepEnv(ROBOT, controller=controller_config(data))
+
+
+def impulse_of_the_root(config, direction):
+    """|∫F dt| [N·s] of the force that a soft root takes, under 70 N on the torso for 3 s."""
+    env = ResidualBalanceEnv(ROBOT, controller=config, pushes=None, duration=6.0)
+    push = {"body": "torso", "force": 70.0, "duration": 3.0, "direction": direction, "start": 0.5}
+    env.reset(seed=0, options={"push": push})
+    total = np.zeros(3)
+    for _ in range(env.max_steps):
+        env.step(np.zeros(4))
+        total += env.config.policy_period * env.episode.root_wrench[:3]
+    assert not env.fallen
+    return np.linalg.norm(total)
+
+
+@pytest.mark.parametrize("direction", [0.0, 90.0, 180.0])
+def test_a_soft_root_takes_less_from_nowhere(direction):
+    """moskalev24 takes 70 to 85 N·s of the 210 of this push, and at most 30 if it leans."""
+    soft = controller_config("moskalev24")
+    leaning = replace(soft, compensation=ForceCompensation())
+    assert impulse_of_the_root(soft, direction) > 60.0
+    assert impulse_of_the_root(leaning, direction) < 30.0

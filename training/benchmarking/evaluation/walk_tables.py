@@ -124,5 +124,5 @@ def lasting_tables(summary: Summary) -> Iterator[Table]:
     if rows := [([name, own["profile"]], own) for name, entry in entries
                 for own in entry.get("sustained", ())]:  # fmt: skip
         yield figure_table("sustained pushes", ["controller", "profile"], HELD, rows)
-    if rows := [([name], entry["gusts"]) for name, entry in entries if "gusts" in entry]:
-        yield figure_table("gusts from one side", ["controller"], GUSTS, rows)
+    if gusts := [([name], entry["gusts"]) for name, entry in entries if "gusts" in entry]:
+        yield figure_table("gusts from one side", ["controller"], GUSTS, gusts)
