@@ -110,7 +110,9 @@ def write_graph(
     return path
 
 
-def within(path: Path, inputs: int, **outputs: np.ndarray) -> Path:
+def within(
+    path: Path, inputs: int, metadata: dict[str, str] | None = None, **outputs: np.ndarray
+) -> Path:
     """A network that gives rows of these arrays by `time_step`, the last one beyond them."""
     actions = outputs["joint_pos"].shape[1]
     last = np.array([len(next(iter(outputs.values()))) - 1], np.float32)
@@ -126,7 +128,7 @@ def within(path: Path, inputs: int, **outputs: np.ndarray) -> Path:
         nodes.append(helper.make_node("Squeeze", [f"two_{name}", "ones"], [name]))
         ends.append((name, [1, *rows.shape[1:]], 1))
     sides: list[Any] = [("obs", [1, inputs], 1), ("time_step", [1, 1], 1)]
-    return write_graph(path, nodes, weights, sides, ends)
+    return write_graph(path, nodes, weights, sides, ends, metadata)
 
 
 def write_yaml(path: Path, **fields: Any) -> Path:

@@ -41,15 +41,15 @@ def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, object]
 def _entries(text: str, field: str, source: Path) -> list[object]:
     """The entries of a list, the only one where it is none."""
     if not text.lstrip().startswith("["):
-        return list(text.split(","))
+        return [each.strip() for each in text.split(",")]
     try:
-        return list(parse_json(text))
+        return list(parse_json(text.replace("'", '"')))  # as Python writes a list of names
     except ValueError as error:
         raise ConfigError(f"is no list in JSON: {error}", source=source, field=field) from None
 
 
 def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
-    names = metadata["observation_names"].split(",")
+    names = list(map(str, _entries(metadata["observation_names"], "observation_names", source)))
     # what tracks a motion is commanded that motion
     tracking = "anchor_body_name" in metadata or any(map(_is_anchor, names))
     renamed = {**RELATIVE, "command": "motion_command"} if tracking else RELATIVE

@@ -13,7 +13,8 @@ import torch
 
 import poise
 from poise.baselines.policy_files.config import Memory, ObservationTerm, PolicyFileConfig
-from poise.baselines.policy_files.networks import load_network, script_sizes
+from poise.baselines.policy_files.networks import load_network
+from poise.baselines.policy_files.script_sizes import script_sizes
 from poise.configs.errors import ConfigError, PoiseError
 from tests.support.policies import helper, write_graph, write_recurrent
 

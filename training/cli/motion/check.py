@@ -102,7 +102,8 @@ def follow(
     Args:
         motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
             motion is made first: a .motion or .csv file, the name of a packaged one, or its text.
-            For a tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1.
+            For a tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1, or
+            "network" for the one within its network.
         controller: as in poise evaluate; a policy from outside that tracks motions follows clips.
         starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
             at each tempo of --fastest.
@@ -127,7 +128,7 @@ def follow(
     from poise.training.benchmarking.trials.names import check_names
 
     script = find_script(motion) if names_script(motion) else None
-    is_clip = Path(motion).suffix in (".npz", ".csv")
+    is_clip = Path(motion).suffix in (".npz", ".csv") or motion == "network"
     check_names([controller], robot=robot, motion=None if script or is_clip else motion)
     from poise.baselines.balance.references.tempo import Tempo
     from poise.training.benchmarking.trials.push_limits import load_limits

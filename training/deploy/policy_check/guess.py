@@ -8,7 +8,8 @@ from pathlib import Path
 
 from poise.baselines.allowance import check_allowed, is_script
 from poise.baselines.policy_files.motion.network import JOINTS, TIME_STEP
-from poise.baselines.policy_files.networks import onnx_session, script_sizes
+from poise.baselines.policy_files.networks import onnx_session
+from poise.baselines.policy_files.script_sizes import script_sizes
 
 LONGEST = 50  # steps of a history that is guessed
 #: terms that most policies see, and their numbers; joints and actions are added

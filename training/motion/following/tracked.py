@@ -10,6 +10,7 @@ import numpy as np
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.policy_files.config import MotionConfig, PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
+from poise.baselines.policy_files.motion.network import NETWORK
 from poise.baselines.policy_files.motion.track import MotionTrack
 from poise.baselines.policy_files.observations import tracks_motion
 from poise.baselines.policy_files.reading import is_policy
@@ -43,15 +44,16 @@ def tracker_config(controller: str) -> PolicyFileConfig | None:
 
 
 def following(config: PolicyFileConfig, motion: str | Path) -> PolicyFileConfig:
-    """The tracker that plays a clip from a trial's begin on.
+    """The tracker that plays a clip from a trial's begin on; "network": the one in its network.
 
     Raises ConfigError for what is no file of a clip.
     """
-    if Path(motion).suffix not in CLIPS:
+    if motion != NETWORK and Path(motion).suffix not in CLIPS:
         raise ConfigError(f"a tracker follows a file of a clip, not {shown(str(motion))}",
-                          field="motion", choices=CLIPS)  # fmt: skip
+                          field="motion", choices=(*CLIPS, NETWORK))  # fmt: skip
     own = config.motion or MotionConfig()
-    return replace(config, motion=replace(own, clip=str(Path(motion).resolve()), plays=True))
+    clip = NETWORK if motion == NETWORK else str(Path(motion).resolve())
+    return replace(config, motion=replace(own, clip=clip, plays=True))
 
 
 def follow_clip(
