@@ -35,13 +35,12 @@ class Stage:
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
-        given: dict[str, Any] = {"duration": self.duration, "pushes": None, "noise": self.noise}
+        given: dict[str, Any] = {"duration": self.duration, "pushes": None, "noise": self.noise,
+                                 "physics": self.physics}  # fmt: skip
         if self.motions:
             given["fall"] = ANYWHERE
         if self.tempo.waits:
             given["tempo"] = self.tempo
-        if self.physics != MUJOCO:
-            given["physics"] = self.physics
         return load_agent(controller, robot, **given)
 
     def motion(self, name: str | None, robot: Robot | None = None) -> ReferenceMotion | None:
