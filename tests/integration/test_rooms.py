@@ -29,7 +29,7 @@ FLOORS = """
  3 baselines/policy_files/onnx, baselines/solvers, baselines/warmup, envs/compiled/maths
  3 envs/terrain, training/running
  4 baselines/motion/clips, envs/robots
- 5 baselines/motion/graphs/joining, envs/physics/pushes
+ 5 baselines/motion/graphs/joining, envs/physics/engines, envs/physics/pushes
  6 baselines/motion/graphs, baselines/motion/graphs/matching
  6 baselines/motion/retargeting/inverse_kinematics, envs/physics
  7 baselines/controller, baselines/whole_body/parts, envs/sensing, envs/viewing
@@ -69,6 +69,7 @@ ALONE = {
     "llvmlite": "envs/compiled",
     "numba.core": "envs/compiled",
     "numba.extending": "envs/compiled",
+    "pydrake": "envs/physics/engines",
     "pybvh": "baselines/motion/clips",
     "mink": "baselines/motion/retargeting",
     "torch": "training/learning",

@@ -38,15 +38,14 @@ class Stage:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
         duration = self.duration + (self.get_up or 0.0)
-        given: dict[str, Any] = {"duration": duration, "pushes": None, "noise": self.noise}
+        given: dict[str, Any] = {"duration": duration, "pushes": None, "noise": self.noise,
+                                 "physics": self.physics}  # fmt: skip
         if self.get_up is not None:
             given["fall"] = {"terminates": False}
         if self.motions:
             given["fall"] = ANYWHERE
         if self.tempo.waits:
             given["tempo"] = self.tempo
-        if self.physics != MUJOCO:
-            given["physics"] = self.physics
         return load_agent(controller, robot, **given)
 
     def motion(self, name: str | None, robot: Robot | None = None) -> ReferenceMotion | None:

@@ -4,7 +4,7 @@ from poise.configs.files import packaged_folder
 from poise.configs.reading import is_file
 
 from .parser import parse, read_script
-from .table import read_table
+from .table import begins_with_number, read_table
 from .tree import Script
 
 
@@ -28,8 +28,13 @@ def find_script(script: str) -> Script:
 
 
 def names_script(text: str) -> bool:
-    """Whether a name of a motion is rather that of a script, or a script: a file, or an arrow."""
-    return text.endswith((".motion", ".csv")) or "->" in text or text in packaged_scripts()
+    """Whether the name of a motion is that of a script, or a script: a file, or an arrow.
+
+    A ``.csv`` file that begins with a number is a clip of postures, not a table.
+    """
+    if text.endswith(".csv"):
+        return not begins_with_number(text)
+    return text.endswith(".motion") or "->" in text or text in packaged_scripts()
 
 
 def between(script: Script, start: str | None, goal: str | None) -> Script:

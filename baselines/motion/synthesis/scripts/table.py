@@ -26,6 +26,20 @@ def read_table(path: str | Path) -> Script:
     return parse(text_of_table(rows, str(path)), str(path))
 
 
+def begins_with_number(path: str | Path) -> bool:
+    """Whether the first cell of a .csv file is a number, as in a clip; False without the file."""
+    try:
+        with Path(path).open(encoding="utf-8", errors="replace") as file:
+            first = file.readline(MOST_BYTES).split(",")[0]
+    except OSError:
+        return False
+    try:
+        float(first)
+    except ValueError:
+        return False
+    return True
+
+
 def text_of_table(rows: list[list[str]], source: str = "table") -> str:
     """The script of a table's rows as text; raises ConfigError for what is no table."""
     cells = [[cell.strip() for cell in row] for row in rows if any(cell.strip() for cell in row)]

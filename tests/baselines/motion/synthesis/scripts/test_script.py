@@ -11,7 +11,7 @@ import numpy as np
 import pyparsing as pp
 import pytest
 
-from poise.baselines.motion.synthesis.scripts.library import find_script
+from poise.baselines.motion.synthesis.scripts.library import find_script, names_script
 from poise.baselines.motion.synthesis.scripts.parser import parse, read_script
 from poise.baselines.motion.synthesis.scripts.printer import plain, table_of, text_of, to_csv
 from poise.baselines.motion.synthesis.scripts.table import read_table, text_of_table
@@ -291,3 +291,12 @@ def test_a_table_is_read_back_and_may_be_edited(tmp_path: Path) -> None:
         file.write_text(text)
         with pytest.raises(ConfigError, match=words):
             read_table(file)
+
+
+def test_a_csv_of_numbers_is_a_clip(tmp_path) -> None:
+    """A table of a script begins with an arrow or a term, a clip of postures with a number."""
+    table, clip = tmp_path / "script.csv", tmp_path / "clip.csv"
+    table.write_text(",->\nstand,walk\n", encoding="utf-8")
+    clip.write_text("-0.013,0.2,0.79\n", encoding="utf-8")
+    assert names_script(str(table)) and not names_script(str(clip))
+    assert names_script(str(tmp_path / "missing.csv"))  # the reader says that it is not there
