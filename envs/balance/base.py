@@ -212,6 +212,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             action=e.action,
             last_action=e.last_action,
             velocity_error=self._velocity_error(),
+            command=self._commanded(),
         )
         return Judge(
             **known,
@@ -232,7 +233,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             if self._privileged:
                 known = partial(self._view, self.simulation)
                 calls += observer(self._privileged, true, e.steps, known)
-            self._end = StepEnd(self._judge(), Program.of(()), Program.of(calls))
+            self._end = StepEnd(self._judge(), self._report(), Program.of(calls))
             self._end_of = world
         return self._end
 
@@ -255,6 +256,14 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     def _velocity_error(self) -> np.ndarray:
         """(3,) how far a walk is from its command, see `RewardView`; here nothing walks."""
         return guarded_zeros(3)
+
+    def _commanded(self) -> np.ndarray:
+        """(3,) the commanded velocity, see `RewardView`; here nothing walks."""
+        return guarded_zeros(3)
+
+    def _report(self) -> Program:
+        """The kernels that follow a judged policy step, before it is observed."""
+        return Program.of(())
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         """Prepare the subclass for a new episode; the simulation has just been reset."""

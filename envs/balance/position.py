@@ -27,8 +27,8 @@ class PositionStep(MotorStep):
 
 
 @compiled
-def position_step(step: PositionStep):
-    """Take a policy step: new targets, then `substeps` physics steps with torques of their own."""
+def drive_step(step: PositionStep):
+    """New targets, then `substeps` physics steps with torques of their own."""
     world, e, views = step.world, step.episode, step.world.views
     aim(step.servos, e.action)
     for _ in range(step.substeps):
@@ -37,6 +37,12 @@ def position_step(step: PositionStep):
         physics_step(world)
     update_state(world.robot, views, world.state)
     run(step.estimate)
+
+
+@compiled
+def position_step(step: PositionStep):
+    """Take a policy step, and judge it."""
+    drive_step(step)
     end_step(step.end)
 
 

@@ -81,6 +81,8 @@ class PushSampler:
         interval: Range of the time from the end of a push to the start of the next one [s].
         no_push: Probability of an episode without any push.
         limit_table: J50 by direction that `controller_fraction` is measured by.
+        kicks: Probability that a kick of the root takes the place of a push.
+        kick_speed: Range of the size of such a kick [m/s].
     """
 
     magnitude: Range = field(metadata={"min": 0.0})
@@ -96,10 +98,13 @@ class PushSampler:
     interval: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})
     no_push: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
     limit_table: LimitTable | None = None
+    kicks: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, "omit": "default"})
+    kick_speed: Range = field(default=(0.5, 1.0), metadata={"min": 0.0, "omit": "default"})
 
     def __post_init__(self):
         for name in (
-            "magnitude", "duration", "direction", "elevation", "start", "count", "interval"
+            "magnitude", "duration", "direction", "elevation", "start", "count", "interval",
+            "kick_speed",
         ):  # fmt: skip
             low, high = getattr(self, name)
             if low > high:
@@ -148,6 +153,8 @@ class PushSampler:
         elevation = rng.uniform(*self.elevation)
         x, y, z = (float(u) for u in self.offset * rng.uniform(-1.0, 1.0, 3))
         value = rng.uniform(*self.magnitude)
+        if self.kicks > 0.0 and rng.random() < self.kicks:
+            return Kick(start, rng.uniform(*self.kick_speed), direction)
         if self.unit == "delta_v":
             return Kick(start, value, direction)
         if self.unit == "controller_fraction":

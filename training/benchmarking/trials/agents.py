@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import is_plugin
+from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.guard.config import (
     GuardConfig,
     guard_config,
@@ -18,6 +19,7 @@ from poise.baselines.environments.guard.config import (
 from poise.baselines.environments.guard.env import GuardedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity.env import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import PluginConfig, find_plugin, make_plugin, plugin_config
@@ -94,7 +96,7 @@ def check_walks(name: str, agent: Agent, source: str) -> None:
 
 def can_walk(agent: Agent) -> bool:
     """Whether the controller of an agent takes commands of a walk."""
-    return isinstance(agent.env, ResidualBalanceEnv) and agent.env.command is not None
+    return isinstance(agent.env, CommandedEnv) and agent.env.command is not None
 
 
 def check_may_walk(name: str, source: str) -> ControllerConfig | None:
@@ -202,6 +204,7 @@ ENVIRONMENTS = {
     "whole": ResidualWholeEnv,
     "torque": TorqueBalanceEnv,
     "position": PositionBalanceEnv,
+    "velocity": VelocityEnv,
 }
 
 

@@ -1,0 +1,1 @@
+"""A walk by joint servos alone: the policy follows commanded velocities."""
