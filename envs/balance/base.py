@@ -57,6 +57,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     action_space: spaces.Box
     _spec: EnvSpec | None = None
     known_terms: ClassVar[Terms] = TERMS  #: of which `observation` chooses
+    #: the blocks of terms that can be of the true state
+    true_views: ClassVar[tuple[type[Block], ...]] = (View,)
     option_names: ClassVar[tuple[str, ...]] = RESET_OPTIONS  #: of `reset`
 
     def __init_subclass__(cls, **arguments: object) -> None:
@@ -156,12 +158,13 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         raise NotImplementedError
 
     def terms_by_name(self, chosen: Sequence[str]) -> list[Term]:
-        """Terms of this robot that every environment has, as `observation.privileged` names them.
+        """Terms of the true robot in its true state, as `observation.privileged` names them.
 
         Raises ConfigError for a name that is unknown, or comes twice.
         """
         names = self._entry_names()
-        true = Terms({name: kind for name, kind in TERMS.items() if kind.view is View})
+        known = self.known_terms.items()
+        true = Terms({name: kind for name, kind in known if kind.view in self.true_views})
         return [kind.of(names) for kind in true.choose(chosen, field="privileged")]
 
     def _entry_names(self) -> dict[str, tuple[str, ...]]:

@@ -19,6 +19,7 @@ from poise.baselines.walking.schedule import (
 )
 from poise.envs.balance.config import EnvConfig
 from poise.envs.balance.episode import end_step
+from poise.envs.balance.mdp.observation import View
 from poise.envs.balance.position import PositionBalanceEnv, PositionStep, drive_step
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
@@ -78,6 +79,7 @@ class VelocityEnv(CommandedEnv, PositionBalanceEnv):
     """
 
     known_terms = VELOCITY_TERMS
+    true_views = (View, CommandView)
     kernel = staticmethod(velocity_step)
     step_block = VelocityStep
     _raw = True  # a learned policy has no estimator below it
