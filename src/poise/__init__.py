@@ -2,7 +2,8 @@
 
 Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/PositionBalance-v0``,
 ``poise/ResidualBalance-v0``, ``poise/ResidualStep-v0``, ``poise/ResidualWalk-v0``,
-``poise/ResidualWhole-v0`` and ``poise/Velocity-v0`` with Gymnasium, and loads neither torch nor numba nor MuJoCo.
+``poise/ResidualWhole-v0`` and ``poise/Velocity-v0`` with Gymnasium, and loads neither torch nor
+numba nor MuJoCo.
 """
 
 from __future__ import annotations

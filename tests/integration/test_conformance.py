@@ -15,6 +15,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 import poise  # noqa: F401  (registers the environments)
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity.env import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.envs.balance.position import PositionBalanceEnv
@@ -27,6 +28,7 @@ IDS = {
     "poise/ResidualWhole-v0": ResidualWholeEnv,
     "poise/TorqueBalance-v0": TorqueBalanceEnv,
     "poise/PositionBalance-v0": PositionBalanceEnv,
+    "poise/Velocity-v0": VelocityEnv,
 }
 EACH = pytest.mark.parametrize("name", IDS)
 #: one of them in every run, all in `make weekly`

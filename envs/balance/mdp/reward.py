@@ -178,6 +178,11 @@ def pace_kept(v: RewardView) -> float:
 
 
 @compiled
+def turn_kept(v: RewardView) -> float:
+    return np.exp(-((v.velocity_error[2] / (0.1 * v.scales.omega)) ** 2))
+
+
+@compiled
 def fall_cost(v: RewardView) -> float:
     return -1.0
 
@@ -221,12 +226,14 @@ class RewardWeights:
         0.0, momentum_small, "exp(−(|L| / 0.1 m h² ω)²), L about the CoM"
     )
     velocity: float = _term(
-        0.0, velocity_small,
-        "exp(−(|ċ_xy − v| / 0.2 ω h)²), of the CoM along the ground; v the command"
+        0.0,
+        velocity_small,
+        "exp(−(|ċ_xy − v| / 0.2 ω h)²), of the CoM along the ground; v the command",
     )
     turning: float = _term(
-        0.0, turning_small,
-        "exp(−(|ω_root − ψ̇ e_z| / 0.5 ω)²), angular velocity of the root; ψ̇ the command"
+        0.0,
+        turning_small,
+        "exp(−(|ω_root − ψ̇ e_z| / 0.5 ω)²), angular velocity of the root; ψ̇ the command",
     )
     joint_limits: float = _term(
         0.0, joint_limit_cost,
@@ -244,6 +251,9 @@ class RewardWeights:
         0.0, pace_kept,
         "exp(−(|Δv| / 0.06 ω h)²), which still tells a walk that is far too slow to go faster"
     )  # fmt: skip
+    turn_pace: float = _term(
+        0.0, turn_kept, "exp(−(Δψ̇ / 0.1 ω)²), the same of the turning rate"
+    )
     power: float = _term(
         0.0, power_cost, "−P / (P + m g ω h), P = Σ |τ q̇| of the motors now", NO_DIVERGENCE
     )
