@@ -251,9 +251,7 @@ class RewardWeights:
         0.0, pace_kept,
         "exp(−(|Δv| / 0.06 ω h)²), which still tells a walk that is far too slow to go faster"
     )  # fmt: skip
-    turn_pace: float = _term(
-        0.0, turn_kept, "exp(−(Δψ̇ / 0.1 ω)²), the same of the turning rate"
-    )
+    turn_pace: float = _term(0.0, turn_kept, "exp(−(Δψ̇ / 0.1 ω)²), the same of the turning rate")
     power: float = _term(
         0.0, power_cost, "−P / (P + m g ω h), P = Σ |τ q̇| of the motors now", NO_DIVERGENCE
     )

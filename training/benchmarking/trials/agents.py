@@ -32,6 +32,7 @@ from poise.baselines.registry import (
     where_uncertain,
 )
 from poise.baselines.walking.config import WalkConfig
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.simbicon import SimbiconConfig
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged
@@ -152,6 +153,8 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     from poise.training.learning.policy_files import controller_fingerprint
 
     policy = load_policy(name, robot)
+    if policy.config.action == "velocity":  # it stands in a trial that commands nothing
+        overrides = {"command": GaitCommand(), **overrides}
     env = policy.make_env(robot=robot, **overrides)
     sizes = (policy.layers[0][0].shape[0], policy.layers[-1][0].shape[1])
     expected = (env.episode.observation.size, len(env.action_names))

@@ -71,7 +71,9 @@ def test_rewards_are_of_the_command():
     env = VelocityEnv(robot(), reward={"effort": 0.0, **only}, **REST)
     command = np.array([0.4, -0.2, 0.5])
     for told, quiet in ((command, False), (np.zeros(3), True)):
-        env.reset(seed=1, options={"command": dict(zip(("ahead", "left", "turn"), told, strict=True))})
+        env.reset(
+            seed=1, options={"command": dict(zip(("ahead", "left", "turn"), told, strict=True))}
+        )
         rng = np.random.default_rng(0)
         for _ in range(10):
             _, _, _, _, info = env.step(rng.uniform(-0.3, 0.3, env.action_space.shape))

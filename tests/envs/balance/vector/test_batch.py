@@ -53,8 +53,14 @@ def test_the_number_of_threads_changes_nothing():
 
 @pytest.mark.parametrize(
     "kind",
-    [ResidualBalanceEnv, ResidualStepEnv, ResidualWholeEnv, TorqueBalanceEnv, PositionBalanceEnv,
-     VelocityEnv],
+    [
+        ResidualBalanceEnv,
+        ResidualStepEnv,
+        ResidualWholeEnv,
+        TorqueBalanceEnv,
+        PositionBalanceEnv,
+        VelocityEnv,
+    ],
 )
 def test_nor_where_steps_are_shared_out_tick_by_tick(kind):
     """As they are with many environments for each thread."""
