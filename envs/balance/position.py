@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
@@ -74,7 +74,7 @@ class PositionBalanceEnv(MotorBalanceEnv):
     """
 
     kernel = staticmethod(position_step)
-    step_block = PositionStep
+    step_block: ClassVar[type[MotorStep]] = PositionStep
 
     def __init__(
         self,

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from poise.envs.balance.config import EnvConfig
 from poise.envs.balance.episode import end_step
 from poise.envs.balance.mdp.observation import View
 from poise.envs.balance.position import PositionBalanceEnv, PositionStep, drive_step
+from poise.envs.balance.torque import MotorStep
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
@@ -81,7 +82,7 @@ class VelocityEnv(CommandedEnv, PositionBalanceEnv):
     known_terms = VELOCITY_TERMS
     true_views = (View, CommandView)
     kernel = staticmethod(velocity_step)
-    step_block = VelocityStep
+    step_block: ClassVar[type[MotorStep]] = VelocityStep
     _raw = True  # a learned policy has no estimator below it
 
     def __init__(
