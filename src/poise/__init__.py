@@ -74,8 +74,8 @@ register(
 )
 register(
     "poise/Velocity-v0",
-    entry_point="poise.baselines.environments.velocity.env:VelocityEnv",
-    vector_entry_point="poise.baselines.environments.velocity.env:vector_env",
+    entry_point="poise.baselines.environments.velocity:VelocityEnv",
+    vector_entry_point="poise.baselines.environments.velocity:vector_env",
 )
 
 if TYPE_CHECKING:

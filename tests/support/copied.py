@@ -15,7 +15,7 @@ import numpy as np
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.environments.velocity.env import VelocityEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import load_controller
 from poise.configs.files import packaged

@@ -11,7 +11,7 @@ from poise.baselines.environments.hand_over import HandOverConfig
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.environments.velocity.env import VelocityEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import ControllerConfig, controller_config

@@ -9,7 +9,7 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales, WholeScales
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.environments.velocity.env import VelocityEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError

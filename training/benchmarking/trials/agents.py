@@ -19,7 +19,7 @@ from poise.baselines.environments.guard.config import (
 from poise.baselines.environments.guard.env import GuardedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.environments.velocity.env import VelocityEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import PluginConfig, find_plugin, make_plugin, plugin_config

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from poise.baselines.controller import COMMAND_ENTRIES
-from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import (
     CommandSampler,
@@ -29,7 +28,8 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
-from .terms import MEAN_TIME, VELOCITY_TERMS, CommandView, Course, follow_course
+from .commanded import CommandedEnv
+from .velocity_terms import MEAN_TIME, VELOCITY_TERMS, CommandView, Course, follow_course
 
 SPEED_TOLERANCE = 0.036  # [ω h] of the mean velocity of a walk that goes on as it should
 

@@ -1,1 +1,0 @@
-"""A walk by joint servos alone: the policy follows commanded velocities."""
