@@ -44,6 +44,11 @@ class CommandedEnv(BalanceEnv):
         self._decides = type(decides).__name__
         self._timetable = empty_timetable()
 
+    def _take_orders(self, orders: np.ndarray, name: str) -> None:
+        """Take the array (8,) of what is commanded where no controller walks, but `name` itself."""
+        self._walker, self._orders, self._decides = None, orders, name
+        self._timetable = empty_timetable()
+
     @property
     def command(self) -> GaitCommand | None:
         """What a controller that follows commands is told now; None for one that follows none.

@@ -100,6 +100,9 @@ class ResidualWalkEnv(ResidualStepEnv):
     def _velocity_error(self) -> np.ndarray:
         return self._strides.error
 
+    def _commanded(self) -> np.ndarray:
+        return self.walker.gait.command[:3]
+
     def _begin(self, options: Mapping[str, Any]) -> None:
         super()._begin(options)
         self._strides.clear()

@@ -41,6 +41,7 @@ class CommandSampler:
         interval: Range of the time after which another command is drawn [s]; None: one holds
             throughout.
         stand: Fraction of the commands that are to stand.
+        alone: Fraction of the others that are a speed ahead, to the left or a turn alone.
     """
 
     ahead: Range = (0.5, 0.5)
@@ -48,6 +49,7 @@ class CommandSampler:
     turn: Range = (0.0, 0.0)
     interval: Range | None = field(default=None, metadata={"above": 0.0})
     stand: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, "omit": "default"})
+    alone: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, "omit": "default"})
 
     def __post_init__(self) -> None:
         for name in ("ahead", "left", "turn", "interval"):
@@ -74,6 +76,9 @@ class CommandSampler:
         ahead, left, turn = (float(rng.uniform(*r)) for r in (self.ahead, self.left, self.turn))
         if self.stand > 0.0 and rng.random() < self.stand:
             return TimedCommand(0.0, 0.0, 0.0, start)
+        if self.alone > 0.0 and rng.random() < self.alone:
+            kept = rng.integers(len(AXES))
+            ahead, left, turn = (x * (i == kept) for i, x in enumerate((ahead, left, turn)))
         return TimedCommand(ahead, left, turn, start)
 
 

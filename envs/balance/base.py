@@ -58,6 +58,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     action_space: spaces.Box
     _spec: EnvSpec | None = None
     known_terms: ClassVar[Terms] = TERMS  #: of which `observation` chooses
+    #: the blocks of terms that can be of the true state
+    true_views: ClassVar[tuple[type[Block], ...]] = (View,)
     option_names: ClassVar[tuple[str, ...]] = RESET_OPTIONS  #: of `reset`
 
     def __init_subclass__(cls, **arguments: object) -> None:
@@ -157,12 +159,13 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         raise NotImplementedError
 
     def terms_by_name(self, chosen: Sequence[str]) -> list[Term]:
-        """Terms of this robot that every environment has, as `observation.privileged` names them.
+        """Terms of the true robot in its true state, as `observation.privileged` names them.
 
         Raises ConfigError for a name that is unknown, or comes twice.
         """
         names = self._entry_names()
-        true = Terms({name: kind for name, kind in TERMS.items() if kind.view is View})
+        known = self.known_terms.items()
+        true = Terms({name: kind for name, kind in known if kind.view in self.true_views})
         return [kind.of(names) for kind in true.choose(chosen, field="privileged")]
 
     def _entry_names(self) -> dict[str, tuple[str, ...]]:
@@ -213,6 +216,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             action=e.action,
             last_action=e.last_action,
             velocity_error=self._velocity_error(),
+            command=self._commanded(),
         )
         return Judge(
             **known,
@@ -233,7 +237,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             if self._privileged:
                 known = partial(self._view, self.simulation)
                 calls += observer(self._privileged, true, e.steps, known)
-            self._end = StepEnd(self._judge(), Program.of(()), Program.of(calls))
+            self._end = StepEnd(self._judge(), self._report(), Program.of(calls))
             self._end_of = world
         return self._end
 
@@ -256,6 +260,14 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     def _velocity_error(self) -> np.ndarray:
         """(3,) how far a walk is from its command, see `RewardView`; here nothing walks."""
         return guarded_zeros(3)
+
+    def _commanded(self) -> np.ndarray:
+        """(3,) the commanded velocity, see `RewardView`; here nothing walks."""
+        return guarded_zeros(3)
+
+    def _report(self) -> Program:
+        """The kernels that follow a judged policy step, before it is observed."""
+        return Program.of(())
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         """Prepare the subclass for a new episode; the simulation has just been reset."""

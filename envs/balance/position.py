@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
@@ -27,8 +27,8 @@ class PositionStep(MotorStep):
 
 
 @compiled
-def position_step(step: PositionStep):
-    """Take a policy step: new targets, then `substeps` physics steps with torques of their own."""
+def drive_step(step: PositionStep):
+    """New targets, then `substeps` physics steps with torques of their own."""
     world, e, views = step.world, step.episode, step.world.views
     aim(step.servos, e.action)
     for _ in range(step.substeps):
@@ -37,6 +37,12 @@ def position_step(step: PositionStep):
         physics_step(world)
     update_state(world.robot, views, world.state)
     run(step.estimate)
+
+
+@compiled
+def position_step(step: PositionStep):
+    """Take a policy step, and judge it."""
+    drive_step(step)
     end_step(step.end)
 
 
@@ -68,7 +74,7 @@ class PositionBalanceEnv(MotorBalanceEnv):
     """
 
     kernel = staticmethod(position_step)
-    step_block = PositionStep
+    step_block: ClassVar[type[MotorStep]] = PositionStep
 
     def __init__(
         self,

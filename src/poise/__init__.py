@@ -1,8 +1,9 @@
 """Poise keeps a simulated humanoid on its feet while it is pushed.
 
 Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/PositionBalance-v0``,
-``poise/ResidualBalance-v0``, ``poise/ResidualStep-v0``, ``poise/ResidualWalk-v0`` and
-``poise/ResidualWhole-v0`` with Gymnasium, and loads neither torch nor numba nor MuJoCo.
+``poise/ResidualBalance-v0``, ``poise/ResidualStep-v0``, ``poise/ResidualWalk-v0``,
+``poise/ResidualWhole-v0`` and ``poise/Velocity-v0`` with Gymnasium, and loads neither torch nor
+numba nor MuJoCo.
 """
 
 from __future__ import annotations
@@ -70,6 +71,11 @@ register(
     "poise/ResidualWhole-v0",
     entry_point="poise.baselines.environments.whole:ResidualWholeEnv",
     vector_entry_point="poise.baselines.environments.whole:vector_env",
+)
+register(
+    "poise/Velocity-v0",
+    entry_point="poise.baselines.environments.velocity:VelocityEnv",
+    vector_entry_point="poise.baselines.environments.velocity:vector_env",
 )
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ import poise  # noqa: F401  registers the environments
 IDS = (
     "poise/TorqueBalance-v0", "poise/PositionBalance-v0",
     "poise/ResidualBalance-v0", "poise/ResidualStep-v0", "poise/ResidualWalk-v0",
-    "poise/ResidualWhole-v0",
+    "poise/ResidualWhole-v0", "poise/Velocity-v0",
 )  # fmt: skip
 #: what else an environment is made with, by a name for the table
 SETTINGS: dict[str, dict[str, Any]] = {

@@ -8,6 +8,7 @@ import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
@@ -21,6 +22,7 @@ CLASSES: dict[str, type[BalanceEnv]] = {
     "residual": ResidualBalanceEnv,
     "step": ResidualStepEnv,
     "whole": ResidualWholeEnv,
+    "velocity": VelocityEnv,
 }
 
 

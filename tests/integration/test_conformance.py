@@ -15,6 +15,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 import poise  # noqa: F401  (registers the environments)
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.envs.balance.position import PositionBalanceEnv
@@ -27,6 +28,7 @@ IDS = {
     "poise/ResidualWhole-v0": ResidualWholeEnv,
     "poise/TorqueBalance-v0": TorqueBalanceEnv,
     "poise/PositionBalance-v0": PositionBalanceEnv,
+    "poise/Velocity-v0": VelocityEnv,
 }
 EACH = pytest.mark.parametrize("name", IDS)
 #: one of them in every run, all in `make weekly`
@@ -185,7 +187,7 @@ def test_torchrl_collects(name):
 def test_observations_change(name):
     """No entry is constant over a few random episodes, but for feet that stay on the ground."""
     varied = {**SMALL, "pushes": {**PUSHES, "magnitude": [0.5, 1.0]}}
-    if name == "poise/ResidualWalk-v0":
+    if name in ("poise/ResidualWalk-v0", "poise/Velocity-v0"):
         ranges = {"ahead": [0.2, 0.6], "left": [-0.1, 0.1], "turn": [-0.2, 0.2]}
         varied |= {"command": ranges, "duration": 1.2}
     env = gymnasium.make(name, **varied)

@@ -168,6 +168,7 @@ def test_import_poise_is_light() -> None:
         "poise/ResidualStep-v0",
         "poise/ResidualWalk-v0",
         "poise/ResidualWhole-v0",
+        "poise/Velocity-v0",
     ],
 )
 def test_registered_environments_exist(name: str) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import load_controller
 from poise.configs.files import packaged
@@ -198,6 +199,7 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
     "step": (lambda: _begin(env_of(ResidualStepEnv, smoothing=0.1)), play_env),
     "whole": (lambda: _begin(env_of(ResidualWholeEnv, hand_over=AT_ONCE)), play_env),
     "position": (lambda: _begin(env_of(PositionBalanceEnv)), play_env),
+    "velocity": (lambda: _begin(env_of(VelocityEnv)), play_env),
     "real torque": (lambda: _begin(env_of(TorqueBalanceEnv, realism="field")), play_env),
     "real residual": (lambda: _begin(env_of(ResidualBalanceEnv, realism="field")), play_env),
     "real step": (lambda: _begin(env_of(ResidualStepEnv, realism="field")), play_env),

@@ -11,6 +11,7 @@ from poise.baselines.environments.hand_over import HandOverConfig
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import ControllerConfig, controller_config
@@ -143,14 +144,15 @@ class TrainConfig:
     action adds instead of `residual`; with "walk" `poise/ResidualWalk-v0`, with these too and
     the `command` that it is given; with "whole" it is `poise/ResidualWhole-v0`, with these
     `servos` and `hand_over` and no `residual`. With "torque" it is `poise/TorqueBalance-v0`, with
-    "position" `poise/PositionBalance-v0` with these `servos`; then controller, motions and their
+    "position" `poise/PositionBalance-v0` with these `servos`, with "velocity" `poise/Velocity-v0`
+    with these and the `command` that it follows; then controller, motions and their
     tempo, both residuals, smoothing and gate are not used.
 
     Attributes:
         robot: Robot to train on: a packaged one (see poise list) or a .yaml description.
         action: What the policy moves: a controller's targets (residual), its steps too (step), a
             walk (walk), servos that take over (whole); or all torques or joint positions by itself
-            (torque, position).
+            (torque, position), the latter as commanded, too (velocity).
         controller: Controller below the policy: a packaged one or a .yaml file of one.
         motion: Motion that is performed: a packaged one, a .yaml, or a .npz of poise motion import.
         motions: Motions that the environments perform in turn, one each, instead of `motion`.
@@ -166,7 +168,7 @@ class TrainConfig:
         residual: What an action of 1 adds to each target, with `action` residual.
         step_residual: The same with `action` step or walk.
         command: The commands of a walk.
-        servos: The servos of `action` position or whole.
+        servos: The servos of `action` position, velocity or whole.
         hand_over: When the servos take over, with `action` whole.
         physics_step: Physics step of the training episodes [s]; None: the robot's own, in which
             policies are evaluated and played.
@@ -178,7 +180,9 @@ class TrainConfig:
     """
 
     robot: str = "humanoid"
-    action: Literal["residual", "step", "walk", "whole", "torque", "position"] = "residual"
+    action: Literal["residual", "step", "walk", "whole", "torque", "position", "velocity"] = (
+        "residual"
+    )
     controller: str = "momentum-qp"
     motion: str = "standing"
     motions: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
@@ -204,7 +208,7 @@ class TrainConfig:
     @property
     def controlled(self) -> bool:
         """Whether a controller is below the policy."""
-        return self.action not in ("torque", "position")
+        return self.action not in ("torque", "position", "velocity")
 
     def make_training_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
         """As `make_env`, with the terms that the critic alone sees: `observation.privileged`."""
@@ -223,6 +227,9 @@ class TrainConfig:
         if self.action == "position":
             arguments = {"servos": self.servos, **overrides}
             return PositionBalanceEnv(robot or self.robot, self.env, **arguments)
+        if self.action == "velocity":
+            arguments = {"servos": self.servos, "command": self.command, **overrides}
+            return VelocityEnv(robot or self.robot, self.env, **arguments)
         if "controller" not in overrides:  # an environment takes a name for what the user says
             overrides["controller"] = self.controller_below()
         kinds: dict[str, tuple[type[ResidualBalanceEnv], dict[str, Any]]] = {

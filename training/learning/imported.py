@@ -29,6 +29,7 @@ from .symmetry import MirroredMeanStd
 FIRM = 1e12  # observations that the imported statistics count for: they stay as they are
 AUTHORITY = 1.0  # of the imported policy: it takes over wherever it may
 
+COMMAND = ("command_velocity", "command_turn")  #: terms of an environment that has a command
 #: a policy's term, the environment's, and the unit of this: a factor, and a field of `Scales`
 SAME = {
     "base_ang_vel": ("root_rate", 1.0, "omega"),
@@ -113,16 +114,11 @@ class Translation:
         if isinstance(described.scale, dict):
             raise self._wrong(i, "with factors by name it cannot be imported")
         if name == "velocity_commands":
-            constant = Affine(np.full(3, -1), np.ones(3), np.array(self.config.command))
-            return constant.scaled(described.scale)
+            return self._command(i, age).scaled(described.scale)
         own, factor, unit = SAME.get(name, (None, 1.0, None))
         if own not in self._places:
             raise self._wrong(i, f"the environment does not tell {name}")
-        shown = f"{own}[-{age}]" if age else own
-        if shown not in self._places:
-            raise self._wrong(i, f"shows {own} of {age} steps ago: observation.history must be "
-                              f"{age + 1} or more")  # fmt: skip
-        index = self._places[shown]
+        index = self._shown(i, own, age)
         if own == "last_action":
             entries = Affine(index[self.entries], 1.0 / self.gain, -self.offset / self.gain)
             return entries.scaled(described.scale)
@@ -135,6 +131,22 @@ class Translation:
         if name == "joint_pos_rel":
             offset = offset - self.joints.default
         return Affine(index, np.full(len(index), gain), offset).scaled(described.scale)
+
+    def _command(self, i: int, age: int) -> Affine:
+        """The command: that of the environment, or the policy's own where there is none."""
+        places = [self._shown(i, name, age) for name in COMMAND if name in self._places]
+        if not places:
+            return Affine(np.full(3, -1), np.ones(3), np.array(self.config.command))
+        units = [self.env.scales.velocity] * 2 + [0.2 * self.env.scales.omega]
+        return Affine(np.concatenate(places), np.array(units), np.zeros(3))
+
+    def _shown(self, i: int, own: str, age: int) -> np.ndarray:
+        """The places of the environment's term `own` as it was `age` policy steps ago."""
+        shown = f"{own}[-{age}]" if age else own
+        if shown not in self._places:
+            raise self._wrong(i, f"shows {own} of {age} steps ago: observation.history must be "
+                              f"{age + 1} or more")  # fmt: skip
+        return self._places[shown]
 
     def _wrong(self, i: int, problem: str) -> ConfigError:
         return ConfigError(problem, source=self.config.described_in, field=f"observations[{i}]",

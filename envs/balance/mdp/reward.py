@@ -32,8 +32,9 @@ class RewardView(Block):
     views: SimViews  # whose `ctrl` (nu,) are the torques of the last control tick [N·m]
     action: np.ndarray  # (na,)
     last_action: np.ndarray  # (na,) of the policy step before
-    # (3,) of a walk's last stride from its command: ahead, left [m/s], turn [rad/s]
+    # (3,) of a walk's mean velocity from its command: ahead, left [m/s], turn [rad/s]
     velocity_error: np.ndarray
+    command: np.ndarray  # (3,) commanded velocity: ahead, left [m/s], turn [rad/s]; zeros: to stand
 
 
 @compiled
@@ -68,6 +69,9 @@ def root_upright(v: RewardView) -> float:
 
 @compiled
 def com_slow(v: RewardView) -> float:
+    for a in range(3):
+        if v.command[a] != 0.0:
+            return 0.0
     velocity = v.state.com_vel
     speed = np.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
     return np.exp(-((speed / v.limits.quiet_speed) ** 2) / 4.0)
@@ -115,14 +119,19 @@ def momentum_small(v: RewardView) -> float:
 
 @compiled
 def velocity_small(v: RewardView) -> float:
-    velocity = v.state.com_vel
-    return np.exp(-(velocity[0] ** 2 + velocity[1] ** 2) / v.scales.velocity**2)
+    velocity, heading, command = v.state.com_vel, v.state.heading, v.command
+    x = velocity[0] - heading[0] * command[0] + heading[1] * command[1]
+    y = velocity[1] - heading[1] * command[0] - heading[0] * command[1]
+    return np.exp(-(x**2 + y**2) / v.scales.velocity**2)
 
 
 @compiled
 def turning_small(v: RewardView) -> float:
-    rate, unit = v.state.qvel[3:6], 0.5 * v.scales.omega
-    return np.exp(-(rate[0] ** 2 + rate[1] ** 2 + rate[2] ** 2) / unit**2)
+    rate, up, unit = v.state.qvel[3:6], v.state.root_axes[2], 0.5 * v.scales.omega
+    total = 0.0
+    for a in range(3):
+        total += (rate[a] - up[a] * v.command[2]) ** 2
+    return np.exp(-total / unit**2)
 
 
 @compiled
@@ -147,6 +156,15 @@ def slip_cost(v: RewardView) -> float:
 
 
 @compiled
+def power_cost(v: RewardView) -> float:
+    power, torques = 0.0, v.views.ctrl
+    for i in range(torques.shape[0]):
+        power += abs(torques[i] * v.state.qvel[v.robot.motor_dofs[i]])
+    unit = v.scales.weight * v.scales.omega * v.scales.height
+    return -power / (power + unit)
+
+
+@compiled
 def command_followed(v: RewardView) -> float:
     x, y, turn = v.velocity_error[0], v.velocity_error[1], v.velocity_error[2]
     way, spin = 0.1 * v.scales.velocity, 0.05 * v.scales.omega
@@ -163,6 +181,11 @@ def pace_kept(v: RewardView) -> float:
 def risen(v: RewardView) -> float:
     height = v.state.com[2] / v.scales.height  # over level ground, whatever the feet do
     return min(max(height, 0.0), 1.0) * 0.5 * (1.0 + uprightness(v.robot, v.state))
+
+
+@compiled
+def turn_kept(v: RewardView) -> float:
+    return np.exp(-((v.velocity_error[2] / (0.1 * v.scales.omega)) ** 2))
 
 
 @compiled
@@ -197,7 +220,9 @@ class RewardWeights:
     upright: float = _term(
         0.1, root_upright, "max(cos φ, 0)⁴, φ the tilt of the root from standing"
     )
-    quiet: float = _term(0.1, com_slow, "exp(−(|ċ| / quiet_speed)² / 4)")
+    quiet: float = _term(
+        0.1, com_slow, "exp(−(|ċ| / quiet_speed)² / 4), 0 where the command is to walk"
+    )
     posture: float = _term(0.1, posture_near, "exp(−Σ (q − q_ref)²)")
     effort: float = _term(0.02, torque_cost, "−mean (τ / τ_max)²", NO_DIVERGENCE)
     action: float = _term(0.1, action_cost, "−mean a²", NO_DIVERGENCE)
@@ -207,10 +232,14 @@ class RewardWeights:
         0.0, momentum_small, "exp(−(|L| / 0.1 m h² ω)²), L about the CoM"
     )
     velocity: float = _term(
-        0.0, velocity_small, "exp(−(ċ_xy / 0.2 ω h)²), of the CoM along the ground"
+        0.0,
+        velocity_small,
+        "exp(−(|ċ_xy − v| / 0.2 ω h)²), of the CoM along the ground; v the command",
     )
     turning: float = _term(
-        0.0, turning_small, "exp(−(|ω_root| / 0.5 ω)²), angular velocity of the root"
+        0.0,
+        turning_small,
+        "exp(−(|ω_root − ψ̇ e_z| / 0.5 ω)²), angular velocity of the root; ψ̇ the command",
     )
     joint_limits: float = _term(
         0.0, joint_limit_cost,
@@ -222,7 +251,7 @@ class RewardWeights:
     )  # fmt: skip
     tracking: float = _term(
         0.0, command_followed,
-        "exp(−(|Δv| / 0.02 ω h)² − (Δψ̇ / 0.05 ω)²), of a walk's last stride from its command"
+        "exp(−(|Δv| / 0.02 ω h)² − (Δψ̇ / 0.05 ω)²), of a walk's mean velocity from its command"
     )  # fmt: skip
     pace: float = _term(
         0.0, pace_kept,
@@ -232,6 +261,10 @@ class RewardWeights:
         0.0, risen, "min(z/h, 1) (1 + cos φ)/2, z the CoM's height over the ground, also after a "
         "fall", NO_DIVERGENCE,
     )  # fmt: skip
+    turn_pace: float = _term(0.0, turn_kept, "exp(−(Δψ̇ / 0.1 ω)²), the same of the turning rate")
+    power: float = _term(
+        0.0, power_cost, "−P / (P + m g ω h), P = Σ |τ q̇| of the motors now", NO_DIVERGENCE
+    )
 
 
 REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)

@@ -94,6 +94,8 @@ class PushSampler:
         either_side: Draw, for an episode, whether its directions are mirrored to the other side.
         others: Further distributions: an episode has the pushes of one of them or of this one, all
             equally likely.
+        kicks: Probability that a kick of the root takes the place of a push.
+        kick_speed: Range of the size of such a kick [m/s].
     """
 
     magnitude: Range = field(metadata={"min": 0.0})
@@ -112,10 +114,13 @@ class PushSampler:
     spread: float | None = field(default=None, metadata={"min": 0.0, "max": 180.0, **OMIT})
     either_side: bool = field(default=False, metadata=OMIT)
     others: "tuple[PushSampler, ...]" = field(default=(), metadata=OMIT)
+    kicks: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, "omit": "default"})
+    kick_speed: Range = field(default=(0.5, 1.0), metadata={"min": 0.0, "omit": "default"})
 
     def __post_init__(self):
         for name in (
-            "magnitude", "duration", "direction", "elevation", "start", "count", "interval"
+            "magnitude", "duration", "direction", "elevation", "start", "count", "interval",
+            "kick_speed",
         ):  # fmt: skip
             low, high = getattr(self, name)
             if low > high:
@@ -177,6 +182,8 @@ class PushSampler:
         x, y, z = (float(u) for u in self.offset * rng.uniform(-1.0, 1.0, 3))
         value = rng.uniform(*self.magnitude)
         profile = PROFILES[int(rng.integers(2))] if self.profile == "any" else self.profile
+        if self.kicks > 0.0 and rng.random() < self.kicks:
+            return Kick(start, rng.uniform(*self.kick_speed), direction)
         if self.unit == "delta_v":
             return Kick(start, value, direction)
         if self.unit == "controller_fraction":

@@ -78,6 +78,20 @@ def test_commands_are_drawn_from_the_ranges():
     assert len(sampler.sample(np.random.default_rng(4), 1e6)) == MOST_COMMANDS
 
 
+def test_a_fraction_of_the_commands_has_one_axis_alone():
+    """Ahead, to the left or a turn, a third each; without it what is drawn stays as it was."""
+    ranges = {"ahead": [0.2, 0.8], "left": [0.1, 0.2], "turn": [0.3, 0.4], "interval": [1.0, 1.0]}
+    rng = np.random.default_rng(5)
+    drawn = [command_sampler({**ranges, "alone": 0.6}).sample(rng, 200.5) for _ in range(16)]
+    moves = np.array([each.array()[:3] != 0.0 for course in drawn for each in course])
+    assert len(moves) == 3216 and set(moves.sum(axis=1)) == {1, 3}
+    assert np.mean(moves.sum(axis=1) == 1) == pytest.approx(0.6, abs=0.035)
+    np.testing.assert_allclose(moves[moves.sum(axis=1) == 1].mean(axis=0), 1.0 / 3.0, atol=0.045)
+    plain, none = (command_sampler({**ranges, **own}).sample(np.random.default_rng(1), 9.0)
+                   for own in ({}, {"alone": 0.0}))  # fmt: skip
+    assert plain == none
+
+
 def test_a_fraction_of_the_commands_is_to_stand():
     rng = np.random.default_rng(4)
     sampler = command_sampler({"ahead": [0.2, 0.8], "interval": [2.0, 5.0], "stand": 0.3})

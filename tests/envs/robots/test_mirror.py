@@ -9,6 +9,7 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales, WholeScales
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError
@@ -36,6 +37,7 @@ def even():
 ENVS = {
     "torque": TorqueBalanceEnv,
     "position": PositionBalanceEnv,
+    "velocity": VelocityEnv,
     "residual": partial(ResidualBalanceEnv, residual=ResidualScales(**BODY)),
     "step": partial(ResidualStepEnv, residual=StepScales(trigger=0.03, **BODY)),
     "whole": partial(ResidualWholeEnv, residual=WholeScales(com=0.1, cop=0.05, **BODY)),
@@ -96,6 +98,21 @@ def test_a_mirrored_walk(even):
     other = observed(env, done(actions), command=mirrored, **start)
     np.testing.assert_allclose(seen(one), other, atol=1e-3)
     assert np.mean(abs(one - other).max(axis=0) > 0.02) > 0.6
+
+
+def test_a_mirrored_command(even):
+    """Commanded to the other side, servos with mirrored targets observe the mirror image."""
+    errors = {"terms": ["com_vel", "command_velocity", "command_turn", "velocity_error",
+                        "turn_error"]}  # fmt: skip
+    env = VelocityEnv(even, duration=1.0, pushes=None, observation=errors)
+    seen, done = env.mirrors()
+    actions = np.random.default_rng(3).uniform(-0.3, 0.3, (12, *env.action_space.shape))
+    start = {"qpos": even.standing_qpos, "qvel": np.zeros(27)}
+    one = observed(env, actions, command={"ahead": 0.2, "left": 0.1, "turn": 0.1}, **start)
+    mirrored = {"ahead": 0.2, "left": -0.1, "turn": -0.1}
+    other = observed(env, done(actions), command=mirrored, **start)
+    np.testing.assert_allclose(seen(one), other, atol=1e-4)
+    assert np.sum(abs(one - other).max(axis=0) > 0.02) >= 5
 
 
 def test_every_term_has_its_image(even):

@@ -110,6 +110,43 @@ def test_it_does_what_the_policy_does(action: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("history", ["term", "frame"])
+def test_the_command_is_the_environments(history: str, tmp_path: Path) -> None:
+    """Where commands change, the targets are those of the policy that is given the same ones."""
+    names = [name for name in robot().joint_names if name != "abdomen_z"]
+    known = {"base_ang_vel": 3, "velocity_commands": 3, "joint_pos_rel": len(names)}
+    network = write_layers(tmp_path / "policy.onnx", [3 * sum(known.values()), *HIDDEN, len(names)])
+    terms: list[dict[str, Any]] = [{"term": term, "history": 3} for term in known]
+    terms[1]["scale"] = [2.0, 0.5, 3.0]
+    fields: dict[str, Any] = {"joints": names, "default": 0.0, "action_joints": []}
+    standing = dict(zip(robot().joint_names, robot().standing_qpos[7:].tolist(), strict=True))
+    fields |= {"action_scale": 0.05, "action_offset": [standing[name] for name in names]}
+    start = policy(tmp_path, network, observations=terms, history=history, **fields)
+    chosen = config(start, "velocity")
+    own = ("root_rate", "command_velocity", "command_turn", "joint_pos")
+    chosen = replace(chosen, env=replace(chosen.env, observation=ObservationConfig(own, history=3)))
+    model, normalize = imported(chosen)
+    env = normalize.venv.batch.envs[0]
+    player = PolicyFile(env.robot, policy_config(start))
+    servos, joints = env.servos, player.joints
+    course = [{"ahead": 0.3, "turn": -0.2}, {"left": 0.4, "ahead": -0.1, "start": 0.06}]
+    env.reset(seed=2, options={"push": [], "command": course})
+    player.reset(env.simulation.state)
+    motors = [list(servos.dofs - 6).index(joint) for joint in joints.moved]
+    found, rng = [], np.random.default_rng(1)
+    for _ in range(8):
+        assert player.orders is not None
+        player.orders[:] = env.command.array()
+        player._state = env.simulation.state
+        player._ask()
+        seen = normalize.normalize_obs(env.episode.observation)
+        action, _ = model.predict(seen, deterministic=True)
+        found.append((servos.hold + servos.reach * action)[motors])
+        np.testing.assert_allclose(found[-1], player._servos.target[joints.moved], atol=2e-5)
+        env.step_without_info(rng.uniform(-0.002, 0.002, env.action_space.shape))
+    assert abs(found[0] - found[-1]).max() > 1e-2  # the command does something
+
+
+@pytest.mark.parametrize("history", ["term", "frame"])
 @pytest.mark.parametrize("order", [{}, {"newest_first": True}, {"lag": 1}])
 def test_a_policy_that_shows_several_steps(history: str, order: dict, tmp_path: Path) -> None:
     """The same targets, step after step, while its own action is taken."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import is_plugin, noting
+from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.guard.config import (
     GuardConfig,
     guard_config,
@@ -19,6 +20,7 @@ from poise.baselines.environments.guard.config import (
 from poise.baselines.environments.guard.env import GuardedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import PluginConfig, find_plugin, make_plugin, plugin_config
@@ -31,6 +33,7 @@ from poise.baselines.registry import (
     where_uncertain,
 )
 from poise.baselines.walking.config import WalkConfig
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.simbicon import SimbiconConfig
 from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.configs.files import packaged
@@ -115,7 +118,7 @@ def check_walks(name: str, agent: Agent, source: str) -> None:
 
 def can_walk(agent: Agent) -> bool:
     """Whether the controller of an agent takes commands of a walk."""
-    return isinstance(agent.env, ResidualBalanceEnv) and agent.env.command is not None
+    return isinstance(agent.env, CommandedEnv) and agent.env.command is not None
 
 
 def check_may_walk(name: str, source: str) -> ControllerConfig | None:
@@ -173,6 +176,8 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     from poise.training.learning.policy_files import controller_fingerprint
 
     policy = load_policy(name, robot)
+    if policy.config.action == "velocity":  # it stands in a trial that commands nothing
+        overrides = {"command": GaitCommand(), **overrides}
     env = policy.make_env(robot=robot, **overrides)
     sizes = (policy.layers[0][0].shape[0], policy.layers[-1][0].shape[1])
     expected = (env.episode.observation.size, len(env.action_names))
@@ -225,6 +230,7 @@ ENVIRONMENTS = {
     "whole": ResidualWholeEnv,
     "torque": TorqueBalanceEnv,
     "position": PositionBalanceEnv,
+    "velocity": VelocityEnv,
 }
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
@@ -52,7 +53,14 @@ def test_the_number_of_threads_changes_nothing():
 
 @pytest.mark.parametrize(
     "kind",
-    [ResidualBalanceEnv, ResidualStepEnv, ResidualWholeEnv, TorqueBalanceEnv, PositionBalanceEnv],
+    [
+        ResidualBalanceEnv,
+        ResidualStepEnv,
+        ResidualWholeEnv,
+        TorqueBalanceEnv,
+        PositionBalanceEnv,
+        VelocityEnv,
+    ],
 )
 def test_nor_where_steps_are_shared_out_tick_by_tick(kind):
     """As they are with many environments for each thread."""

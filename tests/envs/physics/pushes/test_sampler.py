@@ -90,6 +90,19 @@ def test_no_body_named_means_those_of_the_robot(robot):
     assert push.body == robot.model.body(robot.root_body_id).name
 
 
+def test_kicks_among_pushes(robot, sampler):
+    """A fraction of the pushes are kicks; without it what is drawn stays as it was."""
+    rng, mixed = np.random.default_rng(0), replace(sampler, kicks=0.4, kick_speed=(1.0, 3.0))
+    drawn = [push for _ in range(400) for push in mixed.sample(rng, robot)]
+    kicks = [push for push in drawn if isinstance(push, Kick)]
+    assert len(kicks) / len(drawn) == pytest.approx(0.4, abs=0.05)
+    speeds = [kick.delta_v for kick in kicks]
+    assert 1.0 <= min(speeds) < 1.1 and 2.9 < max(speeds) <= 3.0
+    one, other = (each.sample(np.random.default_rng(3), robot)
+                  for each in (sampler, replace(sampler, kick_speed=(1.0, 3.0))))  # fmt: skip
+    assert one == other
+
+
 def test_kicks(robot):
     """Unit delta_v gives velocity kicks."""
     (kick,) = PushSampler((0.2, 0.2), "delta_v").sample(np.random.default_rng(0), robot)
@@ -152,6 +165,8 @@ def test_a_sampler_survives_its_yaml_form(sampler):
         ({"count": [0, 1]}, ("count",)),
         ({"count": [1.0, 2.0]}, ("count",)),
         ({"no_push": 1.1}, ("no_push",)),
+        ({"kicks": 1.1}, ("kicks",)),
+        ({"kick_speed": [3.0, 1.0]}, ("kick_speed",)),
         ({"size": 1}, ("size", "magnitude")),
         ({"limit_table": {"directions": [0.0, 360.0], "impulses": [1.0, 1.0]}}, ("limit_table",)),
         ({"limit_table": {"directions": [0.0], "impulses": []}}, ("limit_table",)),

@@ -1,0 +1,160 @@
+"""`poise/Velocity-v0`: joint servos walk as commanded, and keep the pushed robot on its feet."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from poise.baselines.controller import COMMAND_ENTRIES
+from poise.baselines.walking.planner.command import GaitCommand
+from poise.baselines.walking.schedule import (
+    CommandSampler,
+    TimedCommand,
+    command_sampler,
+    follow_timetable,
+)
+from poise.envs.balance.config import EnvConfig
+from poise.envs.balance.episode import end_step
+from poise.envs.balance.mdp.observation import View
+from poise.envs.balance.position import PositionBalanceEnv, PositionStep, drive_step
+from poise.envs.balance.torque import MotorStep
+from poise.envs.balance.vector.vector_env import make_vector_env
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.robots.robot import Robot
+
+from .commanded import CommandedEnv
+from .velocity_terms import MEAN_TIME, VELOCITY_TERMS, CommandView, Course, follow_course
+
+SPEED_TOLERANCE = 0.036  # [ω h] of the mean velocity of a walk that goes on as it should
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityStep(PositionStep):
+    """All that a policy step works on."""
+
+    course: Course
+
+
+@compiled
+def velocity_step(step: VelocityStep):
+    """The policy step of `position_step`, judged by the command too."""
+    drive_step(step)
+    follow_course(step.course)
+    end_step(step.end)
+
+
+class VelocityEnv(CommandedEnv, PositionBalanceEnv):
+    """Walk or stand as commanded, pushed or not, by targets of the joints' positions.
+
+    Action: Box(−1, 1, (nu,)), that of `PositionBalanceEnv`: a target for each motor's servo, zero
+    stands. There is no controller, no plan and no clock below it.
+
+    Observation: <observation>
+
+    It does not know the push. The reference is the standing posture at rest. Where sensors err or
+    are late, all terms are of what is measured, as it is: nothing is estimated.
+
+    <rewards>
+
+    The commanded velocity counts in `velocity`, `turning` and, by a mean over 0.5 s, in `tracking`
+    and `pace`; `quiet` is earned only where the command is to stand.
+
+    <start>
+
+    Info: in addition "command" (3,) [m/s, m/s, rad/s] and "velocity_error" (3,), the mean velocity
+    less the command. "is_success" is to be within 0.1 m/s of the command (of the humanoid,
+    0.036 ω h), or to rest where that is zero.
+
+    Arguments: as of `PositionBalanceEnv`, and `command`: a `GaitCommand`, a mapping of `ahead`,
+    `left` [m/s] and `turn` [rad/s] or of ranges [lo, hi] of these, see `CommandSampler`. The
+    option "command" of `reset` takes its place in that episode.
+    `config` is `configs/envs/velocity.yaml` by default.
+
+    Version history: v0, first release.
+    """
+
+    known_terms = VELOCITY_TERMS
+    true_views = (View, CommandView)
+    kernel = staticmethod(velocity_step)
+    step_block: ClassVar[type[MotorStep]] = VelocityStep
+    _raw = True  # a learned policy has no estimator below it
+
+    def __init__(
+        self,
+        robot: str | Path | Robot = "humanoid",
+        config: EnvConfig | str | Path | Mapping | None = "velocity",
+        *,
+        command: CommandSampler | GaitCommand | Mapping | None = None,
+        **arguments: Any,
+    ):
+        self.command_sampler = CommandSampler() if command is None else command_sampler(command)
+        self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
+        self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
+        super().__init__(robot, config, **arguments)
+
+    def arguments(self) -> dict[str, Any]:
+        return {**super().arguments(), "command": self.command_sampler}
+
+    def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:
+        if "command" in options:
+            return super()._commands(options)
+        return self.command_sampler.sample(self.np_random, self.config.duration)
+
+    def _begin(self, options: Mapping[str, Any]) -> None:
+        super()._begin(options)
+        self._known_orders[:], self._mean[:] = 0.0, 0.0
+        self._begin_walk(options)
+        self._error[:] = -self._known_orders[:3]
+
+    @property
+    def _known_orders(self) -> np.ndarray:
+        return self._expect_orders("environment")
+
+    def _velocity_error(self) -> np.ndarray:
+        return self._error
+
+    def _commanded(self) -> np.ndarray:
+        return self._known_orders[:3]
+
+    def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        read = self._known_orders, self._error
+        return read if kind is CommandView else super()._readings(kind)
+
+    def _step_members(self) -> dict[str, Any]:
+        period = self.config.policy_period
+        course = Course(
+            state=self.simulation.state_arrays,
+            command=self._known_orders,
+            mean=self._mean,
+            error=self._error,
+            part=float(-np.expm1(-period / MEAN_TIME)),
+        )
+        return {**super()._step_members(), "course": course}
+
+    def _report(self) -> Program:
+        return Program.of([(follow_timetable, self._follower(self._known_orders))])
+
+    @property
+    def recovered(self) -> bool:
+        """Walking as commanded; at rest, where nothing is commanded."""
+        if not self._commanded().any():
+            return super().recovered
+        most = SPEED_TOLERANCE * self.scales.omega * self.scales.height
+        return bool(np.hypot(*self._error[:2]) <= most and not self.fallen)
+
+    def info(self) -> dict[str, Any]:
+        """The entries of `PositionBalanceEnv`, the command and how far the walk is from it."""
+        return {
+            **super().info(),
+            "command": self._commanded().copy(),
+            "velocity_error": self._error.copy(),
+        }
+
+
+vector_env = partial(make_vector_env, VelocityEnv)  # for gymnasium.make_vec
