@@ -1,6 +1,7 @@
 """What an exported file says of the policy: whose it is, what it observes, what its actions do.
 
-Words are mjlab's where it has one, see `policy_files/onnx/metadata.py`: lists have commas between them.
+Words are mjlab's where it has one, see `policy_files/onnx/metadata.py`: lists have commas between
+them.
 """
 
 import json
