@@ -175,8 +175,8 @@ def _rates(
 ) -> Iterator[Change]:
     """The rate of recovered trials, or of those without a fall: in pairs if both played the same
     trials, else by intervals; none where an older result does not have it."""
-    values = figure.value(one), figure.value(two)
-    if values[0] is None or values[1] is None:
+    before, after = figure.value(one), figure.value(two)
+    if before is None or after is None:
         return
     which = 1 if figure is NOT_FALLEN else 0
     required = {"factor": factor, "level": level, "part": part}
@@ -193,11 +193,11 @@ def _rates(
     if found is None or ends is None or not len(pairs) == one["trials"] == two["trials"]:
         intervals = figure.interval(one), figure.interval(two)
         if intervals[0] is not None and intervals[1] is not None:
-            before, after = zip(values, intervals, strict=True)
-            yield from _by_intervals(name, title, before, after)
+            pair = (before, intervals[0]), (after, intervals[1])
+            yield from _by_intervals(name, title, *pair)
         return
     note = f"{found['only_a']} lost, {found['only_b']} won, p = {found['p_mcnemar']:.2g}"
-    yield Change(name, title, *values, found["rate_gain"], *ends, note)
+    yield Change(name, title, before, after, found["rate_gain"], *ends, note)
 
 
 def _levels(one: Entry, two: Entry) -> Iterator[tuple[tuple[str, str], Level, Level]]:

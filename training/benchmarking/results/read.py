@@ -62,8 +62,12 @@ class Record:
     @property
     def won(self) -> bool:
         """What J50, rankings and pairs count, see `training/benchmarking/trials/trial.py`."""
-        walks = self.line.get("commands") and not self.line.get("terrain")
-        return self.upright if walks else self.recovered
+        return self.upright if self.judged_by_falls else self.recovered
+
+    @property
+    def judged_by_falls(self) -> bool:
+        """Whether it is a walk on level ground, see `Trial.judged_by_falls`."""
+        return bool(self.line.get("commands")) and not self.line.get("terrain")
 
     @property
     def met_by_all(self) -> bool:

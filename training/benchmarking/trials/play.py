@@ -184,10 +184,10 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
         outcome = replace(outcome, recovered=not env.fallen and passed == last)
     elif trial.commands[-1].array()[:3].any():
         own = None if first is None else walk.own_error(first)
-        last = None if env.fallen else walk.last_error()
-        recovered = last is not None and near(last, own or NO_ERROR)
+        end = None if env.fallen else walk.last_error()
+        recovered = end is not None and near(end, own or NO_ERROR)
         outcome = replace(outcome, recovered=recovered, **_errors("own", own),
-                          **_errors("last", last))  # fmt: skip
+                          **_errors("last", end))  # fmt: skip
     return outcome
 
 

@@ -12,7 +12,7 @@ from poise.baselines.allowance import allow_words, allowing
 from poise.configs.errors import PoiseError, raised
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
-from poise.training.benchmarking.evaluation.tables import assisted
+from poise.training.benchmarking.evaluation.tables import assisted, walked
 from poise.training.benchmarking.results.read import Record, Results, load_results
 from poise.training.benchmarking.trials.agents import code_of
 from poise.training.pictures.figures.style import Inline
@@ -128,6 +128,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         trials=trials if trials.size <= PACKED else None,
         summary_file=_file(results, SUMMARY, JSON_BYTES),
         crowded=len(order) > CROWD,
+        by_falls=walked(results.summary["controllers"]),
     )  # fmt: skip
 
 

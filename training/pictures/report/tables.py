@@ -60,7 +60,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
     entries, rated = results.summary["controllers"], results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
     rates = (NOT_FALLEN, AS_COMMANDED) if walked(entries) else (RECOVERED, NOT_FALLEN)
-    columns = (
+    columns: tuple[Column, ...] = (
         RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
         replace(HALF_AT, unit=f"× {results.summary['scale']}", words="half of the trials survive"),
         *(replace(each, words=f"{each.words}{mix}") for each in rates),

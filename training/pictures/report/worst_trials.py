@@ -82,9 +82,10 @@ def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> li
         record = (shown or lost)[0]
         winners = recovered.get(record.met, {})
         what = "The smallest push" if math.isfinite(record.fraction) else "The first trial"
-        reason = f"{what} that {name} did not recover"
+        fell = record.fallen and record.judged_by_falls
+        reason = f"{what} {f'in which {name} fell' if fell else f'that {name} did not recover'}"
         if shown:
-            reason += f" and {baseline} did"
+            reason += f" and {baseline} did{' not' if fell else ''}"
         others = tuple(winner for winner in winners if winner != baseline)
         exhibits.append(Exhibit(record, reason, winners.get(baseline), others))
     return exhibits
