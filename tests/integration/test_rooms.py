@@ -16,7 +16,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("configs", "envs", "baselines", "training")
-MOST = 12  # files in a room
+MOST = 15  # files in a room
 DOORS = 7  # folders in a folder
 
 # A room imports rooms of lower floors only; those of one floor do not know each other. A file that
@@ -38,9 +38,9 @@ FLOORS = """
  9 baselines/balance/references, baselines/plugins, baselines/walking/models, baselines/whole_body
  9 envs/balance
 10 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
-10 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
+10 baselines/motion/retargeting, baselines/policy_files/motion, envs/balance/vector
 11 baselines/balance/stepping, baselines/motion/space_time/constraints, baselines/motion/synthesis
-11 envs
+11 baselines/policy_files, envs
 12 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
 13 baselines/walking
 14 baselines/registry
@@ -194,7 +194,7 @@ def test_every_argument_of_a_function_has_a_type() -> None:
 
 
 def test_rooms_are_small_and_say_what_is_in_them() -> None:
-    """At most 12 files each; the first line of a room's `__init__` is one sentence."""
+    """At most 15 files each; the first line of a room's `__init__` is one sentence."""
     files = Counter(path.rpartition("/")[0] for path in sources() if "__init__" not in path)
     assert {room: n for room, n in files.items() if n > MOST} == {}
     said = {room: ast.get_docstring(sources()[f"{room}/__init__.py"]) for room in files}
