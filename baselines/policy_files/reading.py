@@ -12,10 +12,10 @@ from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build, on_base
 
 from .bounds import with_pairs
+from .clip_network import NETWORK, TIME_STEP
 from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
 from .known import RIVALS, expect_network
-from .motion.network import NETWORK, TIME_STEP
 from .networks import onnx_session
 from .onnx.bounds import try_network
 from .onnx.files import description, digest, is_network, is_policy_place, only_network
@@ -119,7 +119,9 @@ def _with_time_step(
 def _with_clip(said: dict[str, Any], folder: Path, source: Path) -> dict[str, Any]:
     """The description with the whole path of its clip."""
     motion = said.get("motion")
-    clip = motion.get("clip") if isinstance(motion, dict) else None
+    if not isinstance(motion, dict):
+        return said
+    clip = motion.get("clip")
     if not isinstance(clip, str) or clip in ("", NETWORK):
         return said
     path = whole_path(folder / clip, source, "motion.clip")

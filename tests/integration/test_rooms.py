@@ -38,9 +38,9 @@ FLOORS = """
  9 baselines/balance/references, baselines/plugins, baselines/walking/models, baselines/whole_body
  9 envs/balance
 10 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
-10 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
+10 baselines/motion/retargeting, baselines/policy_files/motion, envs/balance/vector
 11 baselines/balance/stepping, baselines/motion/space_time/constraints, baselines/motion/synthesis
-11 envs
+11 baselines/policy_files, envs
 12 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
 13 baselines/walking
 14 baselines/registry

@@ -11,8 +11,8 @@ from poise.configs.errors import ConfigError
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from ..config import MotionConfig
 from .clips import FrameClip
+from .config import MotionConfig
 
 USUAL_ANCHOR = "torso_link"  # of trackers of the G1, where nothing names one
 

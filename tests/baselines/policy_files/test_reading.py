@@ -11,7 +11,8 @@ import pytest
 import torch
 
 import poise
-from poise.baselines.policy_files.config import MotionConfig, ObservationTerm, PolicyFileConfig
+from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
+from poise.baselines.policy_files.motion.config import MotionConfig
 from poise.baselines.registry import controller_config, load_controller
 from poise.configs.errors import ConfigError
 from tests.support.policies import gym_config, lab_deploy, linear, within, write_onnx, write_yaml

@@ -174,9 +174,12 @@ def follow(
                 raise ConfigError("give either an impulse or a share of J50", field="share")
             body = load_robot(robot)
             half = load_limits(body).j50() if share else None
-            size = (lambda direction: share * half(direction)) if half else lambda direction: push
+
+            def impulse(direction: float) -> float:
+                return push if half is None else share * half(direction)
+
             tracked = follow_clip(following(tracker, motion), body,
-                                  starts=20 if starts is None else starts, pushed=size,
+                                  starts=20 if starts is None else starts, pushed=impulse,
                                   directions=directions, seed=seed, realism=realism)  # fmt: skip
             print_followed(tracked, f"{Path(motion).stem} by {controller} on {robot}, {pushed}",
                            terminal())  # fmt: skip

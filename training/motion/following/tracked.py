@@ -3,19 +3,22 @@
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.policy_files.config import MotionConfig, PolicyFileConfig
+from poise.baselines.policy_files.clip_network import NETWORK
+from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.policy_files.motion.network import NETWORK
+from poise.baselines.policy_files.motion.config import MotionConfig
 from poise.baselines.policy_files.motion.track import MotionTrack
 from poise.baselines.policy_files.observations import tracks_motion
 from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, shown
+from poise.configs.numbers import whole_number
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
@@ -76,9 +79,12 @@ def follow_clip(
     Args:
         pushed: the impulse [N·s] of a push in a direction [deg], as in `follow`; None: none.
 
-    Raises ConfigError as `PolicyFile`.
+    Raises ConfigError as `PolicyFile`, for counts below 1, a seed or an impulse below 0.
     """
-    level = {} if realism is None else {"realism": load_realism(realism)}
+    for name, count in (("starts", starts), ("directions", directions)):
+        whole_number(count, 1, name)
+    whole_number(seed, 0, "seed")
+    level: dict[str, Any] = {} if realism is None else {"realism": load_realism(realism)}
     env = ResidualBalanceEnv(
         robot, controller=config, pushes=None, duration=LONGEST, fall=ANYWHERE, **level
     )
@@ -89,6 +95,8 @@ def follow_clip(
         start = float(rng.uniform(0.1, 0.9)) * track.course.clip.duration
         direction = 360.0 * k / directions % 360.0
         size = 0.0 if pushed is None else pushed(direction)
+        if not 0.0 <= size < np.inf:
+            raise ConfigError(f"must be at least 0, not {size:g}", field="impulse")
         push = Push(push_bodies(robot)[0], start, PUSH_TIME, size, direction) if size else None
         trials.append(_followed(env, track, seed + k, push))
     return trials

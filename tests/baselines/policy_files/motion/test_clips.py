@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.robot_clip import About, RobotClip, write_robot_clip
+from poise.baselines.policy_files.clip_network import network_clip
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.motion.clips import read_clip, standing_clip
-from poise.baselines.policy_files.motion.network import network_clip
 from poise.baselines.policy_files.networks import load_network
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation

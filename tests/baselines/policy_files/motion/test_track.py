@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from poise.baselines.policy_files.config import MotionConfig, ObservationTerm, PolicyFileConfig
+from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
 from poise.baselines.policy_files.motion.clips import FrameClip
+from poise.baselines.policy_files.motion.config import MotionConfig
 from poise.baselines.policy_files.motion.track import MOTION_ALIASES, MOTION_TERMS, MotionTrack
 from poise.baselines.policy_files.observations import Observer, tracks_motion
 from poise.baselines.policy_files.terms import Seen

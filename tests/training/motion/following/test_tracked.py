@@ -99,6 +99,8 @@ def test_the_command_follows_a_clip(tmp_path: Path, capsys: pytest.CaptureFixtur
     for more, message in (
         (["--tempo", "2"], "at the clip's own pace"),
         (["--push", "1", "--share", "0.5"], "either an impulse or a share"),
+        (["--push", "-1"], "impulse: must be at least 0"),
+        (["--starts", "0"], "starts: must be"),
     ):
         assert main([*args, *more]) == 2
         assert message in " ".join(capsys.readouterr().err.split())

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from ..networks import Network, OnnxNetwork
-from .clips import FRAMES, FrameClip, Frames, make_clip
-from .track import USUAL_ANCHOR
+from .motion.clips import FRAMES, FrameClip, Frames, make_clip
+from .motion.track import USUAL_ANCHOR
+from .networks import Network, OnnxNetwork
 
 NETWORK = "network"  # in the place of a clip's file
 TIME_STEP = "time_step"  # an input: the frame of the clip, from 0 on; the last one is held
