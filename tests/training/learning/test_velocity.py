@@ -1,0 +1,87 @@
+"""A policy that follows velocities: trained, evaluated standing and walking, exported."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.baselines.environments.velocity import VelocityEnv
+from poise.baselines.walking.schedule import CommandSampler
+from poise.envs.balance.config import ObservationConfig
+from poise.training.benchmarking.trials.agents import can_walk, load_agent
+from poise.training.benchmarking.trials.play import run_trial
+from poise.training.benchmarking.trials.trial import Trial
+from poise.training.deploy.export.metadata import metadata
+from poise.training.learning.config import TrainConfig, train_config
+from poise.training.learning.policy import load_policy
+from poise.training.learning.train import train
+from tests.support.shared import robot, tiny_config
+
+TERMS = ("root_rate", "gravity", "command_velocity", "command_turn", "joint_pos", "last_action")
+COMMANDS = CommandSampler((0.2, 0.8), turn=(-0.2, 0.2), interval=(0.1, 0.2))
+
+
+def config() -> TrainConfig:
+    """A run that takes seconds, whose critic sees the error of the command."""
+    tiny = tiny_config(action="velocity", command=COMMANDS)
+    seen = ObservationConfig(TERMS, history=2, privileged=("velocity_error", "com_vel"))
+    tiny = replace(tiny, ppo=replace(tiny.ppo, symmetric=True))
+    return replace(tiny, env=replace(tiny.env, observation=seen))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run."""
+    out = tmp_path_factory.mktemp("velocity") / "run"
+    train(config(), out, progress=False)
+    return out
+
+
+def test_it_walks_and_stands(run: Path) -> None:
+    """It takes the commands of a trial, and stands in a trial without any."""
+    agent = load_agent(str(run), robot(), pushes=None, duration=0.4)
+    assert can_walk(agent) and isinstance(agent.env, VelocityEnv)
+    command = COMMANDS.sample(np.random.default_rng(0), 0.1)
+    for commands, least, most in (((), 0.0, 0.0), (command, 0.2, 0.8)):
+        told: list[np.ndarray] = []
+        watch = lambda env, told=told: told.append(env.info()["command"])  # noqa: E731
+        run_trial(agent, Trial(0, 5, commands=commands), watch)
+        assert len(told) > 5 and all(least <= each[0] <= most for each in told)
+
+
+def test_its_environment_draws_its_own_commands(run: Path) -> None:
+    """As it was trained, and without what the critic alone sees."""
+    env = load_policy(run).make_env()
+    assert isinstance(env, VelocityEnv) and env.command_sampler == COMMANDS
+    assert env.observation_space.shape == (env.seen,)
+    env.reset(seed=0)
+    command = env.command
+    assert command is not None and 0.2 <= command.ahead <= 0.8
+
+
+def test_an_export_names_its_environment(run: Path) -> None:
+    """Its metadata has the command's terms with their units, and the servos."""
+    policy = load_policy(run)
+    env = policy.make_env()
+    said = metadata(policy, env)
+    assert said["environment"] == "poise/Velocity-v0" and "joint_stiffness" in said
+    names = said["observation_names"].split(",")
+    scales = said["observation_terms_scale"].split(",")
+    units = json.loads(said["units"])
+    place = names.index("command_velocity")
+    assert float(scales[place]) == pytest.approx(1.0 / (0.2 * units["omega"] * units["h"]))
+    assert float(scales[names.index("command_turn")]) == pytest.approx(0.2**-1 / units["omega"])
+
+
+def test_the_packaged_configuration_is_whole() -> None:
+    """Of the G1: servos for all its motors, a history of four, a critic that sees more."""
+    config = train_config("velocity-g1")
+    env = config.make_training_env()
+    assert isinstance(env, VelocityEnv) and not config.controlled
+    assert env.seen == 4 * (3 + 3 + 3 + 3 * 29) and len(env.action_names) == 29
+    assert env.observation_space.shape[0] > env.seen
+    env.mirrors()  # the G1 is its own mirror image
+    hidden = {"root_vel", "com", "com_vel", "com_height", "contacts", "velocity_error"}
+    assert not hidden & set(config.env.observation.terms or ())  # no sensor gives these
