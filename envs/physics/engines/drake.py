@@ -94,7 +94,9 @@ class DrakeEngine(Engine):
             given = plant.to_drake(rotation(d.qpos[3:7]), forces + self._friction(d.qvel))
             try:
                 values = plant.step(given)
-            except RuntimeError:  # its solver finds no solution: numbers have become too large
+            except RuntimeError as error:  # of NaN, and where its solver finds no solution
+                if np.isfinite([*d.qpos, *d.qvel, *given]).all() and "converge" not in str(error):
+                    raise
                 d.warning[DIVERGED].number += 1
                 return
             part, bodies = plant.contacts()

@@ -254,6 +254,15 @@ def test_sliding_soles_bear_as_much_along_the_ground_as_friction_lets_them(direc
     assert np.degrees(np.arctan2(-force[1], -force[0])) == pytest.approx(direction, abs=2.0)
 
 
+@pytest.mark.parametrize("speed", [np.nan, 1e200])
+def test_numbers_that_grow_without_end_are_a_fall(speed):
+    env = TorqueBalanceEnv(physics="drake")
+    env.reset(seed=0)
+    env.data.qvel[7] = speed
+    _, _, terminated, _, _ = env.step(np.zeros(env.robot.model.nu))
+    assert terminated
+
+
 def test_what_drake_does_not_hold_is_named():
     with pytest.raises(ConfigError, match=r"drake does not hold terrain \(stairs\)"):
         TorqueBalanceEnv(physics="drake", terrain="stairs")
