@@ -1,4 +1,4 @@
-# make setup   .venv with everything in it (once; again when the requirements change)
+# make setup   .venv with everything in it, kernels compiled (once; again when the requirements change)
 # make test    the tests                    make demo    the main job, with a table and plots
 # make check   format, lint and types       make format  put the format and imports right
 # make docs    the site of docs/ and the docstrings, in build/site
@@ -11,7 +11,7 @@
 #              EXTRAS="zoo video" some of them alone, EXTRAS= none
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
-# make fleet   public humanoids of wheels: read, checked, stood and pushed; an hour; the table: docs/robots.md
+# make fleet   public humanoids of wheels: read, checked, stood and pushed; an hour; the table: docs/log/fleet.md
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
@@ -43,14 +43,16 @@ $(STAMP): pyproject.toml constraints.txt
 	$(if $(LOCKED),$(PYTHON) -m pip install -q $(PIP_ARGS) --require-hashes -r requirements.lock)
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt setuptools
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt --no-build-isolation -e ".[dev]"
+	$(PYTHON) -m poise.baselines.warmup
 	touch $@
 
 test: setup
 	$(PYTHON) -m pytest -q $(PYTEST_WORKERS) $(PYTEST_ARGS)
 
-# The packaged clips, made again from their keyframes.
+# The packaged clips, made again from their keyframes, and from a walk.
 clips: setup
 	$(PYTHON) -m poise.training.motion.recording
+	$(PYTHON) -m poise.training.motion.gaits.recorded_walk
 
 # Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has. Of
 # that file torch alone is held, so that no other build of it is pulled.

@@ -43,6 +43,7 @@ class Allowance:
 
 NOTHING = Allowance()
 _current: ContextVar[Allowance] = ContextVar("allowance", default=NOTHING)
+_asked: ContextVar[list[str] | None] = ContextVar("asked", default=None)
 
 
 def is_plugin(name: object) -> TypeGuard[str]:
@@ -60,7 +61,9 @@ def check_allowed(name: str) -> None:
 
     That is ``module:Class``, or a file of TorchScript.
     """
-    allowance = _current.get()
+    allowance, asked = _current.get(), _asked.get()
+    if asked is not None and name not in asked:
+        asked.append(name)
     if _key(name, allowance.source, "controller") not in allowance.names:
         raise ConfigError(
             f"wants to run code from outside, {name!r}: if you trust it, allow it by --allow "
@@ -141,15 +144,19 @@ def named(*controllers: object) -> list[str]:
     return found
 
 
-def allow_words(controller: str) -> list[str]:
-    """What a printed command needs to play `controller` again: the words of its ``--allow``.
+@contextmanager
+def noting() -> Iterator[list[str]]:
+    """Yield the names that are asked of `check_allowed` inside, allowed or refused; a context."""
+    asked: list[str] = []
+    token = _asked.set(asked)
+    try:
+        yield asked
+    finally:
+        _asked.reset(token)
 
-    That is its own name where it is from outside. A policy's folder or a file may name anything
-    that is allowed here, so it has all of that.
-    """
-    names = named(controller)
-    if not names and os.path.exists(controller):
-        names = sorted(_current.get().names)
+
+def allow_words(names: Iterable[str]) -> list[str]:
+    """Return the words of ``--allow`` by which a printed command allows these names."""
     return [word for name in names for word in ("--allow", name)]
 
 

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import ConfigError, PoiseError, raised
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -75,7 +75,7 @@ def make_plugin(name: str, robot: Robot, arguments: dict[str, object] | None = N
         raise
     except Exception as error:
         raise ConfigError(
-            f"cannot be made for the robot {robot.name!r}: {_text(error)}", source=name
+            f"cannot be made for the robot {robot.name!r}: {raised(error)}", source=name
         ) from error
 
 
@@ -139,7 +139,7 @@ def _module(place: str) -> ModuleType:
             return _from_file(Path(place))
         return _by_name(place)
     except Exception as error:  # whatever the module itself raises
-        raise ConfigError(f"{place!r} cannot be imported: {_text(error)}",
+        raise ConfigError(f"{place!r} cannot be imported: {raised(error)}",
                           field="controller") from None  # fmt: skip
 
 
@@ -177,7 +177,3 @@ def _from_file(path: Path) -> ModuleType:
             del sys.modules[name]
             raise
     return sys.modules[name]
-
-
-def _text(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,9 +1,26 @@
-"""The compiled code that an environment's step needs, made ready once."""
+"""The compiled code that an environment's step needs, made ready once.
+
+``python -m poise.baselines.warmup`` compiles all parts: `make setup` does so.
+"""
 
 from poise.envs.compiled.warmup import fill_cache
 
 KERNELS = "poise.baselines.environments.kernels"  # the module that lists the kernels
 PARTS = ("assembly", "steps", "solver")  # two processes have as much to do
+#: the other parts, in such an order that two processes have as much to do
+FURTHER = ("planner", "contacts", "walking", "sensing", "whole", "performing", "rows")
+NAMES = {  #: of the parts, in the line that says what is compiled
+    "assembly": "the momentum QP",
+    "steps": "physics",
+    "solver": "the QP solver",
+    "planner": "planned steps",
+    "contacts": "changing contacts",
+    "walking": "walking",
+    "sensing": "sensors and estimators",
+    "whole": "servos that take over",
+    "performing": "motions with steps",
+    "rows": "tasks and limits",
+}
 
 
 def prepare(*further: str) -> None:
@@ -12,4 +29,8 @@ def prepare(*further: str) -> None:
     `further` parts of `environments/kernels.py` follow, for ten more; they use the kernels of
     the first.
     """
-    fill_cache(KERNELS, PARTS, further)
+    fill_cache(KERNELS, NAMES, PARTS, further)
+
+
+if __name__ == "__main__":
+    prepare(*FURTHER)

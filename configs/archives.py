@@ -61,8 +61,11 @@ def read_archive(path: str | Path) -> Archive:
     return Archive(read_bytes(path, ARCHIVE_BYTES), path)
 
 
-def read_arrays(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Arrays of 32- or 64-bit floats from an .npz file, as 64-bit ones.
+def read_arrays(path: str | Path, names: Sequence[str], kinds: str = "f") -> dict[str, np.ndarray]:
+    """Arrays of 32- or 64-bit numbers from an .npz file, as 64-bit floats.
+
+    Args:
+        kinds: of numbers, as NumPy's dtypes name them: floats, or whole ones (``fiu``), too.
 
     Raises:
         ConfigError: no such file, no such array, one that is cut off, or one of another type.
@@ -71,19 +74,35 @@ def read_arrays(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray]
     arrays = {}
     for name in names:
         with parsing(path):
-            arrays[name] = _array(archive.read(f"{name}.npy"), name)
+            arrays[name] = _array(archive.read(f"{name}.npy"), name, kinds)
     return arrays
 
 
-def _array(data: bytes, name: str) -> np.ndarray:
+def read_names(path: str | Path, name: str) -> tuple[str, ...]:
+    """The texts of an array in an .npz file; () where it has none of that name.
+
+    Raises ConfigError for an array of something else.
+    """
+    archive = read_archive(path)
+    if f"{name}.npy" not in archive.names:
+        return ()
+    with parsing(path):
+        values = np.load(io.BytesIO(archive.read(f"{name}.npy")), allow_pickle=False)
+        if values.dtype.kind != "U" or values.ndim != 1:
+            raise ValueError(f"{name} must be texts, not {values.dtype}")
+        return tuple(map(str, values))
+
+
+def _array(data: bytes, name: str, kinds: str) -> np.ndarray:
     """The array in an .npy file; raises ValueError for what is none of floats."""
     file = io.BytesIO(data)
     version = np.lib.format.read_magic(file)
     if version != (1, 0):  # what NumPy writes of plain arrays
         raise ValueError(f"{name} is of another version of .npy than 1.0")
     shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
-    if dtype.kind != "f" or dtype.itemsize not in (4, 8):
-        raise ValueError(f"{name} must be of 32- or 64-bit floats, not {dtype}")
+    if dtype.kind not in kinds or dtype.itemsize not in (4, 8):
+        what = "floats" if kinds == "f" else "numbers"
+        raise ValueError(f"{name} must be of 32- or 64-bit {what}, not {dtype}")
     if any(length < 0 for length in shape):
         raise ValueError(f"{name} has the shape {shape}")
     values = np.frombuffer(data, dtype, offset=file.tell())

@@ -3,6 +3,8 @@
 import difflib
 import re
 import reprlib
+import sysconfig
+import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -38,6 +40,29 @@ def meant(name: object, names: Iterable[str]) -> str:
     near = difflib.get_close_matches(text, names, n=1)
     near = near or [each for each in names if text.lower() in re.split(r"\W|_", each.lower())]
     return f", did you mean {one_line(near[0], LONGEST_VALUE)}?" if near else ""
+
+
+def raised(error: BaseException) -> str:
+    """What an exception of somebody's own code says, in one line: its class, its text, its place.
+
+    The place, ``file.py:12``, is the last line that ran of code that is neither of Poise nor of an
+    installed library; of a class that is itself installed, the line that Poise called.
+    """
+    text = one_line(f"{type(error).__name__}: {error}")
+    frames = [
+        (frame.f_code.co_filename, line)
+        for frame, line in traceback.walk_tb(error.__traceback__)
+        if str(frame.f_globals.get("__name__")).partition(".")[0] != "poise"
+    ]
+    own = [each for each in frames if not _INSTALLED.search(each[0]) and _STDLIB not in each[0]]
+    if not frames:
+        return text
+    file, line = own[-1] if own else frames[0]
+    return f"{text} ({one_line(Path(file).name)}:{line})"
+
+
+#: files of libraries, and what has no file
+_INSTALLED, _STDLIB = re.compile(r"[/\\](site|dist)-packages[/\\]|^<"), sysconfig.get_path("stdlib")
 
 
 class _Short(reprlib.Repr):

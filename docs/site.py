@@ -44,7 +44,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
-    """Links to README and the changelog lead to their pages."""
+    """Links to README and the changelog lead to their pages; the search leaves out the log."""
+    if page.file.src_uri.startswith("log/"):
+        page.meta["search"] = {"exclude": True}
     return re.sub(
         r"\]\((?:\.\./)+(README|CHANGELOG)\.md",
         lambda found: f"]({'../' * page.file.src_uri.count('/')}{DIFFERENT[f'{found[1]}.md']}",

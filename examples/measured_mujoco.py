@@ -2,7 +2,7 @@
 
     python examples/measured_mujoco.py feedback-step
 
-Nobody tells where the robot is or how fast. It is pushed forward and to the left, with 15 N·s.
+Its position and velocity are estimated. It is pushed forward and to the left, with 15 N·s.
 """
 
 import sys
@@ -58,6 +58,6 @@ command = controller.command()
 while data.time < 5.0:
     command = controller.command([step(command) for _ in range(controller.measurements)])
 
-believed = controller.state.com[2] / robot.height_com
+estimated = controller.state.com[2] / robot.height_com
 print(controller.name, "stands" if data.subtree_com[0, 2] > 0.8 * robot.height_com else "fell")
-print(f"height of the CoM, believed: {believed:.2f} of that at rest")
+print(f"height of the CoM, estimated: {estimated:.2f} of that at rest")

@@ -59,15 +59,13 @@ def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 HERE = Path(__file__).parent
-#: parts of `environments/kernels.py`, in such an order that two processes have as much to do
-KERNELS = ("planner", "contacts", "walking", "sensing", "whole", "performing", "rows")
 
 
 def pytest_sessionstart(session):
     """Compile the kernels in processes of their own, so that this one and its children agree."""
-    from poise.baselines.warmup import prepare
+    from poise.baselines.warmup import FURTHER, prepare
 
-    prepare(*KERNELS)  # once, and not in each of xdist's processes
+    prepare(*FURTHER)  # once, and not in each of xdist's processes
 
 
 def pytest_collection_modifyitems(items):

@@ -140,7 +140,8 @@ class ControlledEnv(CommandedEnv):
                 self._tick_in_python()
 
     def check(self) -> None:
-        """See `BalanceEnv`; it is the controller's."""
+        """See `BalanceEnv`; it may be the controller's, too."""
+        super().check()
         self._base.check()
 
     def tick(self) -> None:

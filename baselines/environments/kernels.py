@@ -102,7 +102,8 @@ def _tick(env: ResidualBalanceEnv) -> Tick:
     qp = env.controller
     assert isinstance(qp, MomentumQP)  # by default
     problem = qp.assembly(env.simulation.state, env.targets)
-    return Tick(problem, qp.memory, NO_KERNEL, NO_KERNEL)
+    compensation = qp.compensation(env.simulation.state, env.targets)
+    return Tick(problem, qp.memory, compensation, NO_KERNEL, NO_KERNEL)
 
 
 def whole() -> None:

@@ -24,6 +24,7 @@ from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.motor_bus import ask_servo
 from poise.envs.physics.simulation import World, simulate
+from poise.envs.sensing.push_force import PushForce, observe_push
 
 
 @compiled
@@ -106,12 +107,17 @@ class TargetInputs(Block):
     motion: Motion
     com_offset: float  # [m]
     residual: Residual
+    push: PushForce  # the force that is estimated where a term of the observation asks for it
+    observes_push: bool
+    period: float  # of the controller [s]
     targets: TargetArrays
 
 
 @compiled
 def set_targets(a: TargetInputs):
     """Targets of this tick."""
+    if a.observes_push:
+        observe_push(a.push, a.robot, a.state, a.period)
     now, motion = a.clock[0] * a.robot.timestep, a.motion
     time = played_time(motion.pace, a.state, a.targets.com, motion.knots[0], now)
     update_targets(a.robot, a.state, motion, time, a.com_offset, a.residual.offsets, a.targets)

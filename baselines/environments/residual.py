@@ -29,11 +29,12 @@ from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
+from poise.envs.sensing.push_force import forget_pushes, push_force
 
 from .controlled import ControlledEnv
 from .policy_step import TargetInputs, set_targets
 from .scales import Lag, ResidualScales, action_term, make_residual
-from .terms import MOTION_TERMS, MotionView
+from .terms import FORCE_TERMS, ForceView, MotionView
 
 
 @runtime_checkable
@@ -59,6 +60,11 @@ class ResidualBalanceEnv(ControlledEnv):
     | 2 | cop_x | `residual.cop`, 0.15 m | CoP target, forward |
     | 3 | cop_y | `residual.cop`, 0.15 m | CoP target, left |
 
+    With the feet fixed, CoM targets gain for pushes that last and for gusts from one side; the CoP
+    target changes next to nothing at the packaged gains: at rest the CoP is below the CoM, whatever
+    is asked of it, and in between it is the CoM's law that decides. A `residual.cop` of 0 leaves
+    both entries out.
+
     Scales above 0 for `residual.height` [m] and `residual.lean` [rad] append `com_z` (the CoM's
     height) and `lean_x`, `lean_y` (a rotation of the root's target about the axes x and y); one for
     `residual.momentum` [m h² ω] appends `momentum_x` and `momentum_y`, angular momentum that the
@@ -71,7 +77,8 @@ class ResidualBalanceEnv(ControlledEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is that of `motion`.
+    It does not know the push. `observation: {extra: [push_force, push_mean]}` adds the force that
+    is estimated from CoM and CoP, and its leaky mean. The reference is that of `motion`.
 
     A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the
     option "command" of `reset` sets it from the start on: a mapping with `ahead`, `left` [m/s] and
@@ -93,7 +100,7 @@ class ResidualBalanceEnv(ControlledEnv):
 
     scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
     only_targets = True  #: the action moves targets and nothing else
-    known_terms = MOTION_TERMS
+    known_terms = FORCE_TERMS
 
     def __init__(
         self,
@@ -122,6 +129,7 @@ class ResidualBalanceEnv(ControlledEnv):
         limit, period = np.array(self.robot.torque_limit), self.config.policy_period
         self._residual = make_residual(self.residual, lag, period, momentum, limit)
         self._offsets = self._residual.offsets
+        self._push_force = push_force(self.robot.omega)
         with allowing(named(controller)):  # the user hands it over, not a file
             self.controller = self._known = load_controller(controller, self.robot)
         self._stand_in: Controller | None = None  # where state and robot are uncertain
@@ -195,6 +203,8 @@ class ResidualBalanceEnv(ControlledEnv):
         return mirror_terms(terms, parts)
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
+        if kind is ForceView:
+            return (self._push_force,)
         return (self._motion,) if kind is MotionView else super()._readings(kind)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
@@ -227,6 +237,7 @@ class ResidualBalanceEnv(ControlledEnv):
         self._motion.pace.clear()
         self._offsets[:] = 0.0
         self._residual.torques[:] = 0.0
+        forget_pushes(self._push_force)
         set_targets(self._target_inputs())
 
     def _target_inputs(self) -> TargetInputs:
@@ -239,6 +250,9 @@ class ResidualBalanceEnv(ControlledEnv):
                 motion=self._motion,
                 com_offset=self._com_offset,
                 residual=self._residual,
+                push=self._push_force,
+                observes_push=any(term.view is ForceView for term in self.terms),
+                period=float(self._base.period),
                 targets=self._targets,
             )
         return self._inputs

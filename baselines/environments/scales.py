@@ -32,7 +32,7 @@ class ResidualScales:
     torque: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
 
     def entries(self) -> dict[str, float]:
-        """The scale of each target that can be moved, in the order of `motions/offsets.py`."""
+        """The scale of each target that can be moved, in the order of `TARGETS`."""
         scales = (
             self.com, self.com, self.cop, self.cop, self.height,
             self.lean, self.lean, self.momentum, self.momentum,

@@ -13,6 +13,7 @@ from poise.envs.balance.mdp.observation import GROUND, SPACE, Terms, View
 from poise.envs.balance.mdp.terms import TERMS, put_local
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.sensing.push_force import PushForce
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,31 @@ def motion_phase(t: MotionView):
     over = over % 1.0 if motion.loop else min(max(over, 0.0), 1.0)
     v.out[0], v.out[1] = np.sin(2.0 * np.pi * over), np.cos(2.0 * np.pi * over)
     v.out[2] = 1.0 - over
+
+
+@dataclass(frozen=True, eq=False)
+class ForceView(Block):
+    """The block of a term about what pushes: what it reads, and the place that it fills."""
+
+    seen: View
+    push: PushForce
+
+
+FORCE_TERMS = Terms(MOTION_TERMS, ForceView)  #: by name; those about the motion come first
+
+
+@FORCE_TERMS.add(GROUND, "0.1 m g", "estimated force that pushes", "vector", default=False)
+def push_force(t: ForceView):
+    force, v = t.push.force, t.seen
+    put_local(v.state, force[0], force[1], 0.1 * v.scales.weight, v.out)
+
+
+@FORCE_TERMS.add(
+    GROUND, "0.02 m g", "its leaky mean over the last seconds", "vector", default=False
+)
+def push_mean(t: ForceView):
+    mean, v = t.push.mean, t.seen
+    put_local(v.state, mean[0], mean[1], 0.02 * v.scales.weight, v.out)
 
 
 # entries of what a controller tells of its steps, see `Stepping.entries`
@@ -79,7 +105,7 @@ def report_steps(t: StepReporter):
         report[PHASE], report[REMAINING] = w.time[0] / w.duration[0], remaining_time(w)
 
 
-STEP_TERMS = Terms(MOTION_TERMS, StepView)  #: by name; those of every environment come first
+STEP_TERMS = Terms(FORCE_TERMS, StepView)  #: by name; those of every environment come first
 
 
 @compiled

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from .motion.config import MotionConfig
+
 #: one number for all joints, one for each in the policy's order, or by the joints' names
 PerJoint = float | tuple[float, ...] | dict[str, float]
 
@@ -41,6 +43,8 @@ class ObservationTerm:
         at_rest: what it shows in their place while no velocity is commanded, before `clip`.
         newest_first: whether the history begins with the newest step.
         lag: policy steps by which the newest one shown is old; 1: this step is left out.
+        ahead: policy steps by which the frames of a motion's term are ahead, side by side; negative
+            behind; empty: the present one.
         fill: what a history shows of the time before the first step: that step, or zeros.
     """
 
@@ -55,6 +59,7 @@ class ObservationTerm:
     at_rest: tuple[float, ...] | None = _new(None)
     newest_first: bool = _new(False)
     lag: int = _new(0, min=0, max=1000)
+    ahead: tuple[int, ...] = _new((), min=-1000, max=1000)
     fill: Literal["first", "zeros"] = _new("first")
 
     def __post_init__(self) -> None:
@@ -196,8 +201,12 @@ class PolicyFileConfig:
         memory: inputs that are outputs of the step before; ``NAME_in`` and ``NAME_out``, and
             ``input_NAME`` and ``output_NAME``, are known to be.
         batch: whether the observation of TorchScript has an axis before its own; ONNX tells it.
+        warm_up: how many times a network that remembers is asked before a trial's first action;
+            what it answers then is not used.
+        warm_up_with: what it is asked: the first observation, or zeros.
         history: of several steps, oldest first: each term's side by side ("term"), or all terms of
             a step side by side ("frame").
+        motion: what a tracker follows; None: nothing, or what stands where a term shows a motion.
         command: velocity that is asked for, forward and left [m/s], and turning left [rad/s],
             unless the environment commands one.
         phase: period of the clock that the terms ``phase``, ``phase_sin`` and ``phase_cos`` show
@@ -210,6 +219,7 @@ class PolicyFileConfig:
         digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in,
             whatever the YAML file says.
         described_in: the file that says all this, for errors; filled in likewise.
+        said: the fields that a file says; the others are as they are by default. Filled in.
     """
 
     kind: Literal["policy-file"] = "policy-file"
@@ -232,6 +242,7 @@ class PolicyFileConfig:
     hold: float = field(default=15.0, metadata={"min": 0.0, "max": 200.0})
     digest: str = ""
     described_in: str = field(default="", compare=False)
+    said: tuple[str, ...] = field(default=(), compare=False, metadata={"omit": "default"})
     origin: Origin | None = field(default=None, metadata={"omit": "default"}, compare=False)
     held: tuple[float, ...] | dict[str, float | Held] | None = field(
         default=None, metadata={"omit": "default"}
@@ -240,6 +251,9 @@ class PolicyFileConfig:
     outputs: dict[str, str | int] = field(default_factory=dict, metadata={"omit": "default"})
     memory: tuple[Memory, ...] = _new(())
     batch: bool = _new(True)
+    warm_up: int = _new(0, min=0, max=10_000)
+    warm_up_with: Literal["first", "zeros"] = _new("first")
+    motion: MotionConfig | None = field(default=None, metadata={"omit": "default"})
     phase_offsets: tuple[float, ...] = _new((0.0, 0.5))
     phase_runs: Literal["always", "commanded"] = _new("always")
 

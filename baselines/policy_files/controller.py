@@ -26,10 +26,14 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
+from .clip_network import NETWORK, network_clip
 from .config import PolicyFileConfig
-from .joints import joint_servos
+from .joints import JointServos, joint_servos
+from .motion.clips import read_clip, standing_clip
+from .motion.config import MotionConfig
+from .motion.track import MotionTrack
 from .networks import load_network
-from .observations import Observer, follows_commands
+from .observations import Observer, follows_commands, tracks_motion
 from .terms import Seen, roll_pitch
 
 
@@ -72,6 +76,15 @@ def policy_tick(t: PolicyTick):
         )  # fmt: skip
 
 
+def observer_of(
+    robot: Robot, config: PolicyFileConfig, joints: JointServos | None = None
+) -> Observer:
+    """The observations of a policy on a robot; raises ConfigError as `joint_servos`, `Observer`."""
+    joints = joint_servos(robot, config) if joints is None else joints
+    known, moved = ([robot.joint_names[i] for i in each] for each in (joints.index, joints.moved))
+    return Observer(config, known, moved, config.described_in)
+
+
 class PolicyFile(CompiledController):
     """Plays a policy from its files: the network every `policy_period`, PD in every physics step.
 
@@ -91,15 +104,14 @@ class PolicyFile(CompiledController):
         self.period = self.arrays.timestep
         every = whole_steps(config.policy_period, self.period, "policy_period", config.described_in)
         self.joints = joint_servos(robot, config)
-        known, moved = ([robot.joint_names[i] for i in each]
-                        for each in (self.joints.index, self.joints.moved))  # fmt: skip
-        self.observer = Observer(config, known, moved, config.described_in)
-        self.action = np.zeros(len(moved))
+        self.observer = observer_of(robot, config, self.joints)
+        self.action = np.zeros(len(self.joints.moved))
         self._legs = 2.0 * np.pi * np.array(config.phase_offsets)
         self.orders = guarded_zeros(COMMAND_ENTRIES) if follows_commands(config) else None
         self._clock_start: float | None = None  # [s]; None: it stands
         self.network = load_network(Path(config.policy), config)
         self._check_sizes()
+        self.motion = self._motion(source=config.described_in)
         nj = len(self.joints.target)
         limit = np.zeros(nj)
         limit[self.arrays.motor_dofs - 6] = self.arrays.torque_limit
@@ -114,6 +126,23 @@ class PolicyFile(CompiledController):
 
     def __getstate__(self) -> dict[str, object]:
         return {**super().__getstate__(), "_tick": None}  # it holds an address
+
+    def _motion(self, source: str) -> MotionTrack | None:
+        """The motion that the terms show, if any does."""
+        config, robot, joints = self.config, self.robot, self.joints
+        if not tracks_motion(config):
+            return None
+        motion, period = config.motion or MotionConfig(), config.policy_period
+        names = [robot.joint_names[i] for i in joints.index]
+        if motion.clip == NETWORK:
+            clip = network_clip(self.network, robot, names, motion.anchor, period, source)
+        elif motion.clip:
+            clip = read_clip(motion.clip, robot, names, period, motion.rate)
+        else:
+            qpos = robot.standing_qpos.copy()
+            qpos[7 + joints.index] = joints.default
+            clip = standing_clip(robot, period, qpos)
+        return MotionTrack(robot, motion, clip, joints.index, joints.default, source)
 
     def _check_sizes(self) -> None:
         """Ask the network once, with zeros."""
@@ -141,6 +170,8 @@ class PolicyFile(CompiledController):
             self.orders[:] = 0.0
             self.orders[:3] = self.config.command
         self._clock_start = None
+        if self.motion is not None and state is not None:
+            self.motion.begin(state)
         for name in ("stiffness", "damping", "target"):
             getattr(self._servos, name)[:] = getattr(self.joints, name)
         self._servos.tau[:] = 0.0
@@ -156,11 +187,15 @@ class PolicyFile(CompiledController):
         phase = self._phase(now, bool(np.any(command)))
         seen = Seen(
             state, state.q[index], state.qvel[6:][index], self.joints.default, self.action,
-            command, phase, phase + self._legs,
+            command, phase, phase + self._legs, self.motion,
         )  # fmt: skip
+        if self.motion is not None:
+            self.motion.update(state, int(self._servos.ticks[0]) // self._servos.every)
         observations = self.observer.observe(seen)
         if not all(np.all(np.isfinite(each)) for each in observations.values()):
             return  # the simulation diverged, which is a fall
+        if self._servos.ticks[0] == 0:
+            self.warm_up(observations)
         answer = self.network.act(observations)
         for role, values in answer.items():
             if lost := np.count_nonzero(~np.isfinite(values)):
@@ -173,6 +208,13 @@ class PolicyFile(CompiledController):
         self._servos.target[self.joints.moved] = self.joints.targets(action, attitude)
         for gain, values in answer.items():
             getattr(self._servos, gain)[self.joints.moved] = np.maximum(values, 0.0)
+
+    def warm_up(self, observations: dict[str, np.ndarray]) -> None:
+        """Let the network remember what it is asked, before its first action counts."""
+        if self.config.warm_up_with == "zeros":
+            observations = {name: np.zeros_like(each) for name, each in observations.items()}
+        for _ in range(self.config.warm_up):
+            self.network.act(observations)
 
     def _phase(self, now: float, walks: bool) -> float:
         """Of the clock [rad]; where it runs for a walk alone, it is 0 at rest and at its begin."""

@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build
 
+from .bounds import pair, pairs
+
 ACTIONS = ("JointPositionAction", "joint_pos")
 GYM_TERMS = ("base_ang_vel", "projected_gravity", "command", "dof_pos", "dof_vel", "actions")
 
@@ -145,7 +147,9 @@ def _lab_action(lab: LabDeploy, source: Path) -> LabAction:
         raise ConfigError(f"must be one of joint positions, not {', '.join(lab.actions)}",
                           source=source, field="actions", choices=ACTIONS)  # fmt: skip
     name, described = next(iter(lab.actions.items()))
-    return _known(LabAction, _mapping(described, f"actions.{name}", source), source, name)
+    said = _mapping(described, f"actions.{name}", source)
+    said = {**said, "clip": pairs(said.get("clip"))}
+    return _known(LabAction, said, source, name)
 
 
 def _lab_terms(
@@ -157,7 +161,8 @@ def _lab_terms(
     terms: list[dict[str, object]] = []
     phase: dict[str, float] = {}
     for name, entry in described.items():
-        term = _known(LabTerm, _mapping(entry, f"observations.{name}", source), source, name)
+        said = _mapping(entry, f"observations.{name}", source)
+        term = _known(LabTerm, {**said, "clip": pair(said.get("clip"))}, source, name)
         terms.append({"term": name, "clip": term.clip, "history": max(1, term.history_length),
                       "scale": 1.0 if term.scale is None else term.scale})  # fmt: skip
         if "period" in term.params:

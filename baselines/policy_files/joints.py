@@ -130,8 +130,11 @@ def _index(robot: Robot, config: PolicyFileConfig) -> np.ndarray:
         if max(found, default=0) >= len(names):
             raise _wrong(config, "motors", f"number {max(found)} of the policy's is beyond the "
                          f"{len(names)} joints of {robot.name!r}")  # fmt: skip
-    if len(set(found)) < len(found) or not found:
-        raise _wrong(config, "joints", "must be different, at least one")
+    if not found:
+        raise _wrong(config, "joints", "is not given: the joints' names in the policy's order, or "
+                     "their numbers (motors)", names)  # fmt: skip
+    if len(set(found)) < len(found):
+        raise _wrong(config, "joints" if config.joints else "motors", "must be different")
     return np.array(found, dtype=np.int64)
 
 

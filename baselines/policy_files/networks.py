@@ -35,6 +35,15 @@ class Network(Protocol):
         Raises whatever the library of the network raises.
         """
 
+    def memories(self) -> dict[str, np.ndarray]:
+        """What it remembers now, by the names of the inputs or of the buffers that hold it."""
+
+    def remember(self, memories: Mapping[str, np.ndarray]) -> None:
+        """Let it remember other numbers, as many as it does.
+
+        Raises ConfigError for a memory that it does not have, and for another size.
+        """
+
 
 def load_network(path: Path, config: PolicyFileConfig | None = None) -> Network:
     """The network in an ONNX or a TorchScript file. TorchScript runs: ask `check_allowed` before.
@@ -92,8 +101,35 @@ class OnnxNetwork:
     def __reduce__(self) -> tuple[object, ...]:
         return OnnxNetwork, (self.path, self.config), {"_memory": self._memory}
 
+    @property
+    def input_names(self) -> list[str]:
+        """All inputs of the file."""
+        return [each.name for each in self._session.get_inputs()]
+
+    @property
+    def output_names(self) -> list[str]:
+        """All outputs of the file."""
+        return [each.name for each in self._session.get_outputs()]
+
+    def frame(self, step: int, outputs: Sequence[str]) -> list[np.ndarray]:
+        """Outputs for the input `time_step`, zeros elsewhere; nothing is remembered."""
+        given = {each.name: np.zeros([size if isinstance(size, int) and size > 0 else 1
+                                      for size in each.shape], TYPES.get(each.type, np.float32))
+                 for each in self._session.get_inputs()}  # fmt: skip
+        given["time_step"][...] = step
+        return [np.asarray(each, dtype=float).ravel()
+                for each in self._session.run(list(outputs), given)]  # fmt: skip
+
     def reset(self) -> None:
         self._memory = {name: np.zeros_like(value) for name, value in self._memory.items()}
+
+    def memories(self) -> dict[str, np.ndarray]:
+        return {name: value.astype(float) for name, value in self._memory.items()}
+
+    def remember(self, memories: Mapping[str, np.ndarray]) -> None:
+        for name, values in memories.items():
+            before = _same_size(self._memory, name, values, self.path)
+            self._memory[name] = values.astype(before.dtype).reshape(before.shape)
 
     def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         wanted = [*self._roles.values(), *self._pairs.values()]
@@ -113,6 +149,18 @@ class OnnxNetwork:
                                  f"not {_times(self._memory[name].shape)}")  # fmt: skip
         self._memory = memory
         return answer
+
+
+def _same_size(known: Mapping[str, Any], name: str, values: np.ndarray, path: Path) -> Any:
+    """The memory of a name, which is to be as large as these values."""
+    if name not in known:
+        raise ConfigError(f"{path.name} remembers nothing of that name", source=path, field=name,
+                          choices=known)  # fmt: skip
+    before = known[name]
+    if math.prod(before.shape) != values.size:
+        raise ConfigError(f"{path.name} remembers {_times(before.shape)} numbers, not "
+                          f"{_times(values.shape)}", source=path, field=name)  # fmt: skip
+    return before
 
 
 def _times(shape: Sequence[object]) -> str:
@@ -227,6 +275,22 @@ class ScriptNetwork:
         self._type = next((kind for kind in kinds if kind.is_floating_point), torch.float32)
         self._memory = [torch.zeros(each.shape, dtype=self._type) for each in self.config.memory]
 
+    def _kept(self) -> dict[str, Any]:
+        """What is given back, and the buffers in which a module keeps what it remembers itself."""
+        given = zip((each.input for each in self.config.memory), self._memory, strict=True)
+        return {**dict(self._module.named_buffers()), **dict(given)}
+
+    def memories(self) -> dict[str, np.ndarray]:
+        return {name: value.double().numpy().copy() for name, value in self._kept().items()}
+
+    def remember(self, memories: Mapping[str, np.ndarray]) -> None:
+        import torch
+
+        kept = self._kept()
+        for name, values in memories.items():
+            before = _same_size(kept, name, values, self.path)
+            before.copy_(torch.from_numpy(values.reshape(before.shape)).to(before.dtype))
+
     def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         import torch
 
@@ -240,16 +304,6 @@ class ScriptNetwork:
         roles = {"action": 0, **self.config.outputs}
         return {role: found[_place(output)].double().numpy().ravel()
                 for role, output in roles.items()}  # fmt: skip
-
-
-def script_sizes(path: Path) -> tuple[int | None, int | None]:
-    """The numbers that TorchScript takes and gives, as its first and last matrix tell.
-
-    It runs: ask `check_allowed` before.
-    """
-    matrices = [each for each in script_module(read_bytes(path, BYTES), path).parameters()
-                if each.dim() == 2]  # fmt: skip
-    return (matrices[0].shape[1], matrices[-1].shape[0]) if matrices else (None, None)
 
 
 def _place(output: str | int) -> int:

@@ -9,13 +9,20 @@ import numpy as np
 from poise.configs.errors import ConfigError
 
 from .config import ObservationTerm, PolicyFileConfig
-from .terms import COMMAND, KnownTerms, Place, Seen, Term, meaning
+from .motion.track import MOTION_SIZES, MOTION_TERMS, PER_JOINT
+from .terms import COMMANDS, SIZES, KnownTerms, Place, Seen, Term, meaning
 
 
 def follows_commands(config: PolicyFileConfig) -> bool:
     """Return whether a policy sees the velocity that is commanded."""
     parts = [part for parts in config.inputs.values() for part in parts]
-    return any(meaning(term) == COMMAND for part in parts for term in part.terms)
+    return any(meaning(term) in COMMANDS for part in parts for term in part.terms)
+
+
+def tracks_motion(config: PolicyFileConfig) -> bool:
+    """Return whether a policy sees a motion that it is to follow."""
+    parts = [part for parts in config.inputs.values() for part in parts]
+    return any(meaning(term) in MOTION_TERMS for part in parts for term in part.terms)
 
 
 class Observer:
@@ -36,8 +43,9 @@ class Observer:
     ):
         legs = len(config.phase_offsets)
         names = {"joint_pos": joints, "joint_pos_rel": joints, "joint_vel": joints,
-                 "last_action": moved}  # fmt: skip
-        sizes = {"phase": 2, "roll_pitch": 2, "phase_sin": legs, "phase_cos": legs,
+                 "last_action": moved, **dict.fromkeys(PER_JOINT, joints)}  # fmt: skip
+        sizes = {**SIZES, **MOTION_SIZES, "motion_command": 2 * len(joints),
+                 "phase_sin": legs, "phase_cos": legs,
                  **{term: len(each) for term, each in names.items()}}  # fmt: skip
         known = KnownTerms({term: list(each) for term, each in names.items()}, sizes, source)
         self._inputs: dict[str, _Side | _Part] = {}

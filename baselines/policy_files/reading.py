@@ -11,6 +11,8 @@ from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build, on_base
 
+from .bounds import with_pairs
+from .clip_network import NETWORK, TIME_STEP
 from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
 from .known import RIVALS, expect_network
@@ -89,13 +91,43 @@ def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
     path, version = _network(named, folder, source)
     if not is_script(path):
         try_network(path, version)
-        metadata = onnx_session(path).get_modelmeta().custom_metadata_map
-        below = {**metadata_fields(metadata, path), **below}
-    config = build(PolicyFileConfig, {**below, **data, "policy": str(path)}, source)
+        session = onnx_session(path)
+        below = {**metadata_fields(session.get_modelmeta().custom_metadata_map, path), **below}
+        data = _with_time_step(below, data, [each.name for each in session.get_inputs()])
+    said = {**below, **data, "policy": str(path)}
+    if isinstance(below.get("motion"), dict) and isinstance(data.get("motion"), dict):
+        said["motion"] = {**below["motion"], **data["motion"]}
+    said = _with_clip(said, folder, source)
+    config = build(PolicyFileConfig, with_pairs(said), source)
     if not config.observations or not all(config.inputs.values()):
         raise ConfigError(f"what the policy sees is not said; {advice(path)}", source=source,
                           field="observations")  # fmt: skip
-    return replace(config, digest=version, described_in=str(source))
+    return replace(config, digest=version, described_in=str(source), said=tuple(sorted(said)))
+
+
+def _with_time_step(
+    below: dict[str, Any], said: dict[str, Any], inputs: list[str]
+) -> dict[str, Any]:
+    """What is said, in which an input `time_step` shows the frame of the clip."""
+    terms = said.get("observations", below.get("observations"))
+    others = [name for name in inputs if name != TIME_STEP]
+    if TIME_STEP not in inputs or isinstance(terms, dict) or not terms or len(others) != 1:
+        return said
+    return {**said, "observations": {others[0]: terms, TIME_STEP: [{"term": TIME_STEP}]}}
+
+
+def _with_clip(said: dict[str, Any], folder: Path, source: Path) -> dict[str, Any]:
+    """The description with the whole path of its clip."""
+    motion = said.get("motion")
+    if not isinstance(motion, dict):
+        return said
+    clip = motion.get("clip")
+    if not isinstance(clip, str) or clip in ("", NETWORK):
+        return said
+    path = whole_path(folder / clip, source, "motion.clip")
+    if not is_file(path):
+        raise ConfigError(f"no such file: {path}", source=source, field="motion.clip")
+    return {**said, "motion": {**motion, "clip": str(path)}}
 
 
 def _network(name: str | None, folder: Path, source: Path) -> tuple[Path, str]:

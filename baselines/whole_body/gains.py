@@ -8,6 +8,7 @@ in m g, moments in m g h; a stiffness of 1 is ω² = g/h and a damping of 1 is �
 from dataclasses import dataclass, field
 from typing import Literal
 
+from .compensation import ForceCompensation
 from .contacts.contact import Contact
 from .limits.limit import Limit
 from .tasks.task import Task
@@ -112,7 +113,8 @@ class MomentumQPConfig:
     wrench u_root on it (a game character that must not fail). `tasks`: what else v̇ is to do, each
     under a name of its own, see `tasks/`; `contacts`: what touches the world besides the soles, see
     `contacts/`; `limits`: what else bounds the solution, see `limits/`. Without `joint` (null)
-    nothing stops joints before their limits.
+    nothing stops joints before their limits. With `compensation` CoM and CoP lean against what
+    pushes, see `compensation.py`.
     """
 
     kind: Literal["momentum-qp"] = "momentum-qp"
@@ -127,6 +129,7 @@ class MomentumQPConfig:
     contact: SoleContact = field(default_factory=SoleContact)
     torque: TorqueLimit = field(default_factory=TorqueLimit)
     joint: JointLimit | None = field(default_factory=JointLimit)
+    compensation: ForceCompensation | None = field(default=None, metadata={"omit": "default"})
     tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "default"})
     contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "default"})
     limits: dict[str, Limit] = field(default_factory=dict, metadata={"omit": "default"})

@@ -16,11 +16,20 @@ from poise.baselines.solvers import QP, Status, make_solver
 from poise.baselines.warmup import prepare
 from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
+from .compensation import (
+    Compensation,
+    compensate,
+    forget_compensation,
+    make_compensation,
+    move_targets,
+    rebound,
+)
 from .contacts.contact import contact_arrays
 from .gains import COMPILED_SOLVER, CoMTask, MomentumQPConfig
 from .parameters import QPParameters, qp_parameters
@@ -120,6 +129,10 @@ class MomentumQP(BoundQP, CompiledController):
         if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
             self.solver = make_solver(self.config.solver, **self.config.solver_options)
         self._motor_joints = self.arrays.motor_dofs - 6
+        #: (2,) what the force adds to the capture point [m], see `Compensation.offset`
+        self.force_offset = guarded_zeros(2)
+        self.observes_force = True  #: false: whoever calls its tick watches what pushes
+        self._compensation: Compensation | None = None
         self._assembly: Assembly | None = None
         self._tick: Tick | None = None
 
@@ -152,6 +165,8 @@ class MomentumQP(BoundQP, CompiledController):
         self.workspace.tau[:] = 0.0
         self.workspace.root_wrench[:] = 0.0
         self.workspace.wrenches[:] = 0.0
+        if self._compensation is not None:
+            forget_compensation(self._compensation)
         if self.solver is not None:
             self.solver.reset()
 
@@ -174,9 +189,20 @@ class MomentumQP(BoundQP, CompiledController):
         ws, p = self.workspace, self.parameters
         return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root, ws.vdot)
 
+    def compensation(self, state: RobotState, targets: Targets) -> Compensation:
+        """The block that `compensate` moves these targets by, see `ForceCompensation`."""
+        s, t, known = state.arrays, targets.arrays(), self._compensation
+        if known is None:
+            known = make_compensation(
+                self.config.compensation, self.arrays, s, t, self.period, self.force_offset,
+                self.observes_force,
+            )  # fmt: skip
+        self._compensation = rebound(known, s, t)
+        return self._compensation
+
     def assembly(self, state: RobotState, targets: Targets) -> Assembly:
         """The block that `assemble` fills the workspace from."""
-        s, t, known = state.arrays, targets.arrays(), self._assembly
+        s, t, known = state.arrays, self.compensation(state, targets).moved, self._assembly
         if known is None or known.state is not s:
             known = self.new_assembly(self.arrays, s, self.parameters, t, self.workspace, s)
         elif known.targets is not t or known.parameters is not self.parameters:
@@ -189,7 +215,7 @@ class MomentumQP(BoundQP, CompiledController):
         problem = self.assembly(state, targets)
         if self._tick is None or self._tick.problem is not problem:
             stages = address_of(assemble, problem), address_of(solve, self.workspace)
-            self._tick = Tick(problem, self.memory, *stages)
+            self._tick = Tick(problem, self.memory, self.compensation(state, targets), *stages)
         return self._tick
 
     def _filled(self, state: RobotState, targets: Targets) -> Assembly:
@@ -202,6 +228,8 @@ class MomentumQP(BoundQP, CompiledController):
         """The reduced QP of this state: pure, nothing is solved or remembered."""
         ws = self.workspace
         before = ws.cop_prev.copy()
+        if (moved := self.compensation(state, targets)).active:
+            move_targets(moved)
         assemble(self._filled(state, targets))
         ws.cop_prev[:] = before
         return QP(ws.H.copy(), ws.g.copy(), ws.C.copy(), ws.l.copy(), ws.u.copy())
@@ -212,6 +240,8 @@ class MomentumQP(BoundQP, CompiledController):
         if self.solver is None:
             momentum_tick(self.tick(state, targets))
         else:
+            if (moved := self.compensation(state, targets)).active:
+                compensate(moved)
             assemble(problem)
             solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.status is Status.INFEASIBLE:

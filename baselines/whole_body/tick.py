@@ -16,6 +16,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.kinematics import StateArrays
 
+from .compensation import Compensation, compensate
 from .parameters import QPParameters
 from .reduced_qp import Assembly, recover
 from .workspace import Workspace
@@ -93,6 +94,7 @@ class Tick(Block):
 
     problem: Assembly
     memory: Memory
+    compensation: Compensation  # of the problem's targets, where it is active
     assemble: Kernel[Assembly]  # `assemble`, of `problem`
     solve: Kernel[Workspace]  # `solve`, of the problem's workspace
 
@@ -101,6 +103,8 @@ class Tick(Block):
 def momentum_tick(t: Tick):
     """Run one control tick: `tau` (nj,) of the workspace then holds torques."""
     a = t.problem
+    if t.compensation.active:
+        compensate(t.compensation)
     call(t.assemble, a)
     call(t.solve, a.workspace)
     accept(a.state, a.parameters, a.workspace, t.memory)

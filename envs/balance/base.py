@@ -35,6 +35,7 @@ from .episode import (
     FALLEN,
     QUIET_STEPS,
     SATURATED,
+    TERMINATED,
     TICKS,
     EpisodeArrays,
     Judge,
@@ -81,7 +82,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self.robot = on_terrain(known, self.config.terrain)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.policy_period)}
         self._set_up_rendering(self.robot.model, render_mode, width, height, camera)
-        self.estimator = self.config.estimator
+        self.estimator, self.physics = self.config.estimator, self.config.physics
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
         self.simulation = Simulation(self.robot)
         self.arrays: RobotArrays = self.simulation.arrays  #: of `robot`
@@ -288,6 +289,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     def check(self) -> None:
         """Raise what has gone wrong in the last compiled step: compiled code cannot raise."""
+        self.simulation.engine.check()
 
     def compiled_step(self) -> CompiledStep | None:
         """The compiled form of `advance`, if there is one; the same object while it can be used."""
@@ -300,7 +302,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
         `options`: "push" sets the pushes exactly (a mapping, a list of mappings, [] for none; see
         `parse_pushes`), "noise" scales the start noise, "qpos" (nq,) and "qvel" (nv,) are the
-        start itself; "realism" fixes fields of the level, a mapping.
+        start itself, "fallen" is the number of a posture on the ground to start from (see
+        `fallen_posture`); "realism" fixes fields of the level, a mapping.
 
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
@@ -309,7 +312,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         super().reset(seed=seed_number(seed))
         rng = self.np_random
         self._draw(options.get("realism"), rng)
-        qpos, qvel = chosen_start(self.simulation, self.config.noise, options, rng)
+        qpos, qvel = chosen_start(
+            self.simulation, self.config.noise, self.config.fallen, options, rng
+        )
         state = self.simulation.reset(qpos, qvel)
         pushes = chosen_pushes(options.get("push"), self.push_sampler, self.robot, state, rng)
         self.simulation.set_pushes(pushes)
@@ -362,7 +367,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         """Take the step of an action that has been set: reward, terminated, truncated."""
         self.expect_running()
         self.advance()
-        terminated = self.fallen
+        terminated = bool(self.episode.metrics[TERMINATED])
         truncated = not (terminated or self.episode.running[0])
         return float(self.episode.reward[0]), terminated, truncated
 
@@ -377,7 +382,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     @property
     def fallen(self) -> bool:
-        """True after a fall."""
+        """True after a fall; where a fall does not end the episode, while the robot is down."""
         return bool(self.episode.metrics[FALLEN])
 
     @property

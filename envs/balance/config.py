@@ -7,6 +7,7 @@ from pathlib import Path
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
+from poise.envs.physics.engines.config import Physics, load_physics
 from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.realism import Realism, load_realism
@@ -58,12 +59,14 @@ class EnvConfig:
         duration: Length of an episode [s].
         pushes: Pushes that are drawn at a reset; None: none.
         noise: Disturbance of the start.
+        fallen: Fraction of the episodes that begin on the ground, in one of `FALLEN_POSTURES`.
         fall: When the robot has fallen, and when it is quiet.
         reward: Weights of the reward's terms.
         observation: What the observation is made of.
         realism: How real sensors, motors, body and ground are: a level by name, file or fields.
         estimator: How the state is estimated where it is not known exactly.
         terrain: What the robot stands on.
+        physics: What engine steps the robot: a name, a file or fields.
         clip_action: Take actions beyond [-1, 1] as 1 or -1, instead of refusing them.
     """
 
@@ -73,12 +76,14 @@ class EnvConfig:
         default_factory=lambda: PushSampler(magnitude=(0.2, 0.5), unit="specific_impulse")
     )
     noise: StartNoise = field(default_factory=StartNoise)
+    fallen: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, **OMIT})
     fall: FallLimits = field(default_factory=FallLimits)
     reward: RewardWeights = field(default_factory=RewardWeights)
     observation: ObservationConfig = field(default_factory=ObservationConfig, metadata=OMIT)
     realism: Realism = field(default_factory=Realism, metadata=OMIT)
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig, metadata=OMIT)
     terrain: Terrain = field(default_factory=Flat, metadata=OMIT)
+    physics: Physics = field(default_factory=Physics, metadata=OMIT)
     clip_action: bool = field(default=False, metadata=OMIT)
 
 
@@ -86,7 +91,7 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: obj
     """An EnvConfig from a .yaml file, a mapping or an object; `overrides` win.
 
     `terrain` may be the name of a kind alone, `realism` that of a level, `estimator` that of a
-    kind.
+    kind, `physics` that of an engine.
 
     Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
     that is no field.
@@ -114,6 +119,8 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: obj
     merged = {**fields, **overrides}
     if "realism" in merged:
         merged["realism"] = to_dict(load_realism(merged["realism"]))
+    if "physics" in merged:
+        merged["physics"] = to_dict(load_physics(merged["physics"]))
     if isinstance(merged.get("estimator"), str):
         merged["estimator"] = {"kind": merged["estimator"]}
     if isinstance(merged.get("terrain"), str):

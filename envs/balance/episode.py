@@ -33,8 +33,9 @@ from .mdp.termination import Limits, has_diverged, has_fallen, uprightness
     TORQUE_VARIATION,  # sum over ticks of the mean over motors of |Δτ|/τ_max
     TORQUE_TIME,  # of the ticks that were accounted for [s]
     EDGE_CONTACTS,  # times that a foot came to touch an edge of the terrain
-) = range(18)
-METRICS = 18
+    TERMINATED,  # 1 where the episode ended by a fall, or because the simulation diverged
+) = range(19)
+METRICS = 19
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +119,14 @@ def judge_step(j: Judge):
     update_support(j.robot, s)
     diverged = has_diverged(j.views)
     fallen = diverged or has_fallen(j.robot, s, j.limits)
-    m[FALLEN] = 1.0 if fallen else 0.0
+    over = diverged or (fallen and j.limits.terminates)
+    m[FALLEN], m[TERMINATED] = 1.0 if fallen else 0.0, 1.0 if over else 0.0
     record_quiet(j, fallen)
     record_excursions(s, e)
     record_edges(s, e)
     e.reward[0] = sum_rewards(j.rewards, fallen, diverged, e.reward_terms)
     e.steps[0] += 1
-    e.running[0] = not fallen and e.steps[0] < j.limits.max_steps
+    e.running[0] = not over and e.steps[0] < j.limits.max_steps
 
 
 @compiled

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from poise.configs.errors import ConfigError
-from poise.configs.numbers import finite_array, option_mapping
+from poise.configs.numbers import finite_array, option_mapping, whole_number
 from poise.envs.physics.pushes.options import parse_pushes
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.physics.pushes.sampler import PushSampler
@@ -15,7 +15,10 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-RESET_OPTIONS = ("push", "noise", "qpos", "qvel", "realism")
+from .fallen import fallen_posture
+
+FALLEN_POSTURES = 512  #: from which training episodes begin; an evaluation has others
+RESET_OPTIONS = ("push", "noise", "qpos", "qvel", "fallen", "realism")
 
 
 @dataclass(frozen=True)
@@ -71,14 +74,30 @@ def reset_options(options: object, known: Sequence[str] = RESET_OPTIONS) -> dict
 
 
 def chosen_start(
-    simulation: Simulation, noise: StartNoise, options: Mapping[str, Any], rng: np.random.Generator
+    simulation: Simulation,
+    noise: StartNoise,
+    fallen: float,
+    options: Mapping[str, Any],
+    rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the start (nq,), (nv,) of `options`, disturbed where these do not say it.
 
-    Raises ConfigError for "noise", "qpos" or "qvel" that are no finite numbers of their shape.
+    Without options it is on the ground with probability `fallen`, in one of `FALLEN_POSTURES`.
+
+    Raises ConfigError for "noise", "qpos" or "qvel" that are no finite numbers of their shape, and
+    for a "fallen" that is no whole number from 0 on.
     """
-    scale = float(_numbers(options.get("noise", 1.0), (), "noise"))
-    start = dict(zip(("qpos", "qvel"), disturbed_start(simulation, noise, scale, rng), strict=True))
+    number = options.get("fallen")
+    if number is None and fallen > 0.0 and rng.uniform() < fallen:
+        number = int(rng.integers(FALLEN_POSTURES))
+    if number is None:
+        scale = float(_numbers(options.get("noise", 1.0), (), "noise"))
+        qpos, qvel = disturbed_start(simulation, noise, scale, rng)
+    else:
+        number = whole_number(number, 0, "fallen", "reset")
+        qpos = fallen_posture(simulation.robot, number)
+        qvel = np.zeros(simulation.model.nv)
+    start = {"qpos": qpos, "qvel": qvel}
     for name, numbers in start.items():
         if options.get(name) is not None:
             start[name] = _numbers(options[name], numbers.shape, name)

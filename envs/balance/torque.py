@@ -63,6 +63,7 @@ class MotorBalanceEnv(BalanceEnv):
 
     def advance(self) -> None:
         self.compiled_step().play()
+        self.check()
 
     def compiled_step(self) -> CompiledStep:
         """The compiled policy step; the same object while it can be used again."""

@@ -17,10 +17,15 @@ class CallbackAddress(int):
     callback: "Callback"
 
     def __reduce__(self) -> tuple[Any, ...]:
+        if not self:
+            return CallbackAddress, (0,)
         return getattr, (self.callback, "address")
 
     def __copy__(self) -> "CallbackAddress":
         return self
+
+
+NO_CALLBACK = CallbackAddress(0)  #: stands in a block that calls nothing back
 
 
 class Callback:

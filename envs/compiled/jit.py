@@ -77,13 +77,17 @@ def _folder(function: Callable) -> Path | None:
 
 
 PATIENCE = 1.0  # [s] of compilation before the user is told
-MESSAGE = "poise: compiling for the first use; this takes twenty to thirty seconds, once"
-if CACHE is None:
-    MESSAGE = f"poise: compiling, in every process anew, for no kernels are kept: {NO_CACHE}"
+
+
+def message(what: str) -> str:
+    """The line that says what is compiled, and for how long."""
+    if CACHE is None:
+        return f"poise: compiling {what}, in every process again: no kernels are kept: {NO_CACHE}"
+    return f"poise: compiling {what} for the first use: up to a minute, once"
 
 
 class Patience(event.Listener):
-    """Says on the standard error, once in a process, that compilation takes a while.
+    """Says on the standard error that compilation takes a while, and what is compiled.
 
     Kernels read from the cache raise no event, nor do a user's own functions count.
     """
@@ -97,14 +101,13 @@ class Patience(event.Listener):
         self.depth += 1
         module = event.data["dispatcher"].py_func.__module__ or ""  # none, of a generated function
         ours = module.startswith("poise.")
-        if ours and time.perf_counter() - self.begun > PATIENCE:
-            self.tell()
+        if ours and not self.announced and time.perf_counter() - self.begun > PATIENCE:
+            self.tell(module.removeprefix("poise."))
 
-    def tell(self) -> None:
-        """The message, once in a process."""
-        if not self.announced:
-            self.announced = True
-            print(MESSAGE, file=sys.stderr, flush=True)
+    def tell(self, what: str) -> None:
+        """Print the message; what is compiled in passing has none of its own from then on."""
+        self.announced = True
+        print(message(what), file=sys.stderr, flush=True)
 
     def on_end(self, event: event.Event) -> None:
         self.depth -= 1

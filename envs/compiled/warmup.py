@@ -1,6 +1,6 @@
 """Compile the kernels once, in processes of their own.
 
-Several at once are done sooner than one, and a user is told once that this takes a while.
+Several at once are done sooner than one, and a line says what is compiled.
 """
 
 import contextlib
@@ -8,7 +8,7 @@ import gc
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -22,12 +22,13 @@ _compiling = False  # whether this process is one of those that compile
 _tried: set[str] = set()  # parts that this process has had compiled, or could not have
 
 
-def fill_cache(module: str, *groups: Sequence[str]) -> None:
+def fill_cache(module: str, names: Mapping[str, str], *groups: Sequence[str]) -> None:
     """Compile what is missing: each group is a list of functions of `module`, its parts.
 
-    The parts of a group are compiled at the same time, and use the kernels of the groups before
-    it. Each processor has a process, which takes every so many-th part of the group in turn: those
-    that take longest should stand first. Where no cache can be written, nothing happens.
+    `names` says what each part is, in the line that a user reads meanwhile. The parts of a group
+    are compiled at the same time, and use the kernels of the groups before it. Each processor has a
+    process, which takes every so many-th part of the group in turn: those that take longest should
+    stand first. Where no cache can be written, nothing happens.
     """
     if _compiling or jit.CACHE is None:
         return
@@ -36,7 +37,7 @@ def fill_cache(module: str, *groups: Sequence[str]) -> None:
         if not missing:
             continue
         _tried.update(missing)
-        jit.patience.tell()
+        jit.patience.tell(", ".join(names[part] for part in missing))
         if not _compile_apart(module, missing):
             return
 

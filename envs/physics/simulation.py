@@ -7,11 +7,13 @@ import mujoco
 import numpy as np
 
 from poise.envs.compiled.block import Block
+from poise.envs.compiled.callbacks import CallbackAddress, call_back
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
+from poise.envs.physics.engines.engine import Engine
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.physics.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
 from poise.envs.robots.robot import Robot
@@ -25,17 +27,27 @@ SOME_PUSHES = 4  # rows of a table that may grow
 
 
 @compiled
-def advance(robot: RobotArrays, views: SimViews, pushes: np.ndarray, clock: np.ndarray):
+def advance(
+    robot: RobotArrays,
+    views: SimViews,
+    pushes: np.ndarray,
+    clock: np.ndarray,
+    stepper: CallbackAddress,
+):
     """Take one physics step with the controls in `views.ctrl`.
 
     Enters and leaves with the position and velocity stages current, so whoever reads the state
-    needs no second pass. `clock` (1,) counts steps since the reset.
+    needs no second pass. `clock` (1,) counts steps since the reset. `stepper` is that of the
+    simulation's `Engine`.
     """
     dt = robot.timestep
     t = clock[0] * dt
     views.xfrc_applied[:, :] = 0.0
     apply_pushes(pushes, t, dt, views.xfrc_applied, views.xmat)
-    mj_step2(views.model_address, views.data_address)
+    if stepper == 0:
+        mj_step2(views.model_address, views.data_address)
+    else:
+        call_back(stepper)
     apply_kicks(pushes, t, dt, views.qvel)
     clock[0] += 1
     mj_step1(views.model_address, views.data_address)
@@ -53,13 +65,14 @@ class World(Block):
     motors: Program  # what comes of the controls, before each physics step
     sensors: Program  # what measures, after each physics step
     bus: MotorBus  # between the computer and the motors
+    stepper: CallbackAddress  # of the engine
 
 
 @compiled
 def physics_step(world: World):
     """Take one physics step with the controls in `views.ctrl`, by motors and sensors."""
     run(world.motors)
-    advance(world.robot, world.views, world.pushes, world.clock)
+    advance(world.robot, world.views, world.pushes, world.clock, world.stepper)
     run(world.sensors)
 
 
@@ -85,13 +98,24 @@ class Simulation(Copyable):
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
         self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
+        self._engine = Engine(robot, self.data)
+        self._world: World | None = None
         self.equip(Program.of(()), Program.of(()), ideal_bus())
         self.reset()
+
+    @property
+    def engine(self) -> Engine:
+        """What takes the physics steps; may be replaced between episodes."""
+        return self._engine
+
+    @engine.setter
+    def engine(self, engine: Engine) -> None:
+        self._engine, self._world = engine, None
 
     def equip(self, motors: Program, sensors: Program, bus: MotorBus) -> None:
         """Have compiled code call these kernels before and after every physics step."""
         self.motors, self.sensors, self.bus = motors, sensors, bus
-        self._world: World | None = None
+        self._world = None
 
     def world(self) -> World:
         """The block of this simulation; the same object until `equip`, or a longer `push_table`."""
@@ -105,6 +129,7 @@ class Simulation(Copyable):
                 motors=self.motors,
                 sensors=self.sensors,
                 bus=self.bus,
+                stepper=self._engine.stepper,
             )
         return self._world
 
@@ -140,6 +165,7 @@ class Simulation(Copyable):
             self.data.qvel[:] = qvel
         mujoco.mj_normalizeQuat(self.model, self.data.qpos)
         mujoco.mj_forward(self.model, self.data)
+        self._engine.begin()
         self.clock[0] = 0
         self.state_arrays.edges[:] = 0.0
         update_state(self.arrays, self.views, self.state_arrays)
@@ -163,4 +189,5 @@ class Simulation(Copyable):
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""
         self.views.ctrl[:] = torques
         simulate(self.world(), count)
+        self._engine.check()
         return self.state

@@ -36,10 +36,11 @@ def contact_friction(model: mujoco.MjModel, ground: int, geoms: Iterable[int]) -
     """
     if model.opt.enableflags & OVERRIDE:
         return float(model.opt.o_friction[0])
-    return min(_pair_friction(model, geom, ground) for geom in geoms)
+    return min(pair_friction(model, geom, ground) for geom in geoms)
 
 
-def _pair_friction(model: mujoco.MjModel, geom: int, other: int) -> float:
+def pair_friction(model: mujoco.MjModel, geom: int, other: int) -> float:
+    """The sliding friction that MuJoCo gives two geoms, but for a model that overrides it."""
     for i in range(model.npair):
         if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == {geom, other}:
             return float(model.pair_friction[i, 0])

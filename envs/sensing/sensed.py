@@ -7,6 +7,8 @@ import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError
+from poise.envs.physics.engines.config import Physics
+from poise.envs.physics.engines.engine import make_engine
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot
@@ -21,6 +23,7 @@ class SensedRobot:
     """The base of what has a simulation, a level of realism and a `StateSource`."""
 
     robot: Robot  #: that is known; the simulated one may differ, see `Realism`
+    physics = Physics()  #: of the engine that steps the robot
     estimator: EstimatorConfig  #: how the state is estimated where it is not known exactly
     drawn: DrawnRobot | None  #: of the running episode; None where it is the one that is known
     drawn_told: dict[str, Any]  #: what `info` tells of it
@@ -105,8 +108,10 @@ class SensedRobot:
         self._take(source)
 
     def _take(self, source: StateSource) -> None:
-        self._state_source = source
-        source.simulation.equip(source.drive, source.sense, source.bus)
+        self._state_source, simulation = source, source.simulation
+        if simulation.engine.physics != self.physics:
+            simulation.engine = make_engine(self.physics, simulation.robot, simulation.data)
+        simulation.equip(source.drive, source.sense, source.bus)
         self._unbind()
 
     def _draw(self, given: object, rng: np.random.Generator) -> None:

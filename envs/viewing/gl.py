@@ -4,6 +4,8 @@ import ctypes.util
 import os
 import sys
 
+from poise.configs.errors import PoiseError
+
 
 def choose_gl_backend() -> str | None:
     """Set ``MUJOCO_GL`` on Linux without a display; returns its value, None if it is not set.
@@ -34,6 +36,8 @@ def load_osmesa_alone() -> None:
     Call it before anything imports MuJoCo. PyOpenGL, which loads OSMesa for MuJoCo, shows its
     symbols to all that is loaded later. Mesa brings an LLVM with it, which would take the place of
     Triton's own: a build of torch with CUDA would end the process when it makes an optimizer.
+
+    Raises PoiseError where the library is not installed: MuJoCo could not be imported.
     """
     if os.environ.get("MUJOCO_GL", "").lower() != "osmesa" or "OpenGL.platform" in sys.modules:
         return
@@ -41,8 +45,15 @@ def load_osmesa_alone() -> None:
     names, shown = vars(ctypes), ctypes.RTLD_GLOBAL
     names["RTLD_GLOBAL"] = ctypes.RTLD_LOCAL  # PyOpenGL has no setting of it
     try:
-        import OpenGL.platform  # noqa: F401
+        from OpenGL.platform import PLATFORM
+
+        found = PLATFORM.GL is not None
     except Exception:
-        pass  # MuJoCo tells what is missing
+        found = True  # MuJoCo tells what is missing
     finally:
         names["RTLD_GLOBAL"] = shown
+    if not found:
+        raise PoiseError(
+            "MUJOCO_GL=osmesa, but OSMesa is not installed: install the package libosmesa6 "
+            "(Debian, Ubuntu), or set MUJOCO_GL=egl where there is a GPU"
+        )

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,6 +13,7 @@ ARGUMENTS = {
     "measured_mujoco.py": ["momentum-qp"],
     "optuna_search.py": ["1", "64"],
     "own_controller.py": [],
+    "own_torques.py": [],
     "plain_mujoco.py": ["feedback-step"],
     "ppo_single_file.py": ["--steps", "128", "--envs", "2", "--rollout", "32"],
     "push_strip.py": ["strip.png"],
@@ -57,6 +59,37 @@ def test_a_controller_stands_by_sensors_alone(tmp_path):
 def test_a_controller_stands_on_messages(tmp_path):
     """Positions with gains hold a pushed G1, which has no sensors of force."""
     assert run("unitree_lowcmd.py", tmp_path) == "momentum-qp-g1 by targets stands\n"
+
+
+def test_torques_from_the_dynamics_stand(tmp_path):
+    """Also when it is pushed."""
+    assert run("own_torques.py", tmp_path).count("stands") == 2
+
+
+@pytest.mark.parametrize("name", ["humanoid", "compact"])
+def test_the_torques_of_the_example_obey_the_dynamics(name, monkeypatch):
+    """M v̇ + h = Sᵀτ + Jᵀw holds in every row with the wrench that it leaves, and soles rest."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import numpy as np
+    import own_torques as example
+
+    from poise.baselines import Targets
+    from tests.support.shared import generic_state, robot
+
+    simulation, real = generic_state(name), robot(name)
+    state = simulation.state
+    names = ("standing_qpos", "motor_dofs", "model")
+    strong = np.full_like(real.torque_limit, 1e9)  # nothing is clipped
+    body = SimpleNamespace(torque_limit=strong, **{each: getattr(real, each) for each in names})
+    controller, targets = example.InverseDynamics(body), Targets.standing(real, state)
+    vdot, tau = controller.acceleration(state, targets), controller.torques(state, targets)
+    left = state.M @ vdot + state.h
+    left[np.array(real.motor_dofs)] -= tau
+    assert len(tau) == len(left) - 6  # every joint has a motor: all rows must hold
+    w = np.linalg.lstsq(state.J.T, left, rcond=None)[0]
+    assert np.abs(state.J.T @ w - left).max() < 1e-8 * np.abs(left).max()
+    sole = -state.Jdot_v - example.SOLE_DAMPING * state.J_v
+    np.testing.assert_allclose(state.J @ vdot, sole, atol=1e-8 * np.abs(sole).max() + 1e-8)
 
 
 @pytest.mark.weekly

@@ -21,7 +21,7 @@ import pytest
 import yaml
 
 import poise
-from poise.baselines.motion.clips.library import captured_clips, packaged_clips
+from poise.baselines.motion.clips.library import captured_clips, packaged_clips, walking_clips
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = {
@@ -71,7 +71,7 @@ def test_the_wheel_holds_exactly_the_tracked_files(tmp_path: Path) -> None:
 
 
 def test_no_captured_clip_is_in_the_repository() -> None:
-    """Every BVH file is one that `poise.training.motion.recording` makes, and no file of the
+    """Every BVH file is one that `poise.training.motion` records, and no file of the
     folder beside the repository, where captured ones are, is also in it."""
     listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True,
                              check=False).stdout  # fmt: skip
@@ -79,7 +79,10 @@ def test_no_captured_clip_is_in_the_repository() -> None:
     if not tracked:
         pytest.skip("not a git checkout")
     clips = sorted(path for path in tracked if path.suffix.lower() in (".bvh", ".amc", ".asf"))
-    assert clips == [Path(f"configs/clips/{name}.bvh") for name in packaged_clips()]
+    assert clips == [
+        *(Path(f"configs/clips/{name}.bvh") for name in packaged_clips()),
+        *(Path(f"configs/clips/walks/{name}.bvh") for name in walking_clips()),
+    ]
     assert all(path.stem.startswith("humanoid_") for path in clips)
     others = {path.read_bytes() for path in captured_clips().values()}
     assert [path for path in clips if (ROOT / path).read_bytes() in others] == []

@@ -29,7 +29,7 @@ FLOORS = """
  3 baselines/policy_files/onnx, baselines/solvers, baselines/warmup, envs/compiled/maths
  3 envs/terrain, training/running
  4 baselines/motion/clips, envs/robots
- 5 baselines/motion/graphs/joining, envs/physics/pushes
+ 5 baselines/motion/graphs/joining, envs/physics/engines, envs/physics/pushes
  6 baselines/motion/graphs, baselines/motion/graphs/matching
  6 baselines/motion/retargeting/inverse_kinematics, envs/physics
  7 baselines/controller, baselines/whole_body/parts, envs/sensing, envs/viewing
@@ -38,9 +38,9 @@ FLOORS = """
  9 baselines/balance/references, baselines/plugins, baselines/walking/models, baselines/whole_body
  9 envs/balance
 10 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
-10 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
+10 baselines/motion/retargeting, baselines/policy_files/motion, envs/balance/vector
 11 baselines/balance/stepping, baselines/motion/space_time/constraints, baselines/motion/synthesis
-11 envs
+11 baselines/policy_files, envs
 12 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
 13 baselines/walking
 14 baselines/registry
@@ -54,7 +54,7 @@ FLOORS = """
 20 training/benchmarking/evaluation
 21 training/benchmarking/results, training/motion/gaits
 22 training/deploy/export, training/pictures/report, training/pictures/sessions
-23 training, training/pictures/motion_report, training/pictures/view
+23 training, training/pictures/gallery, training/pictures/motion_report, training/pictures/view
 24 training/cli/motion
 25 training/cli
 """
@@ -69,6 +69,7 @@ ALONE = {
     "llvmlite": "envs/compiled",
     "numba.core": "envs/compiled",
     "numba.extending": "envs/compiled",
+    "pydrake": "envs/physics/engines",
     "pybvh": "baselines/motion/clips",
     "mink": "baselines/motion/retargeting",
     "torch": "training/learning",

@@ -1,58 +1,24 @@
-"""docs/seeds.md: its rows are whole, what they name exists, and (weekly) every command in it runs.
-
-That its commands parse is one of the tests of all pages, in test_docs.py.
-"""
+"""docs/seeds.yaml and the page that is made of it: rows are whole, what they name exists, and their
+commands print their figures: some every day, all in `make weekly`."""
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "seeds.md"
-DOCUMENTS = ("000", "001", "003", "004")
-#: a command, and the exit code that it is to have if that is not 0
-COMMAND = re.compile(r"`((?:poise|python -m) [^`]+)`(?: \(exit code (\d)\))?")
+from tests.integration.test_docs import folder, parsed  # noqa: F401
+from tests.seeds.page import PAGE, page_of
+from tests.seeds.rows import ROOT, STATES, Document, Figure, load_documents
+from tests.seeds.running import faults, prepare, run_alone, run_here, runs_of
+
+DOCUMENTS = load_documents()
+ROWS = [row for document in DOCUMENTS for row in document.rows]
+DAILY = runs_of(ROWS, daily=True)
 LINK = re.compile(r"\]\(([^)#]*)(?:#([^)]+))?\)")
-
-
-class Row(NamedTuple):
-    """A row of a table: its document, and its columns."""
-
-    document: str
-    described: str
-    there: str
-    ours: str
-    state: str
-    command: str
-    here: str
-
-
-def rows() -> list[Row]:
-    """All of the tables that begin with `described`, in order."""
-    found, document, table = [], "", False
-    for line in PAGE.read_text().splitlines():
-        if match := re.match(r"## (\d{3}): ", line):
-            document = match[1]
-        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
-        if table and cells and set(cells[0]) != {"-"}:
-            assert len(cells) == len(Row._fields) - 1, line
-            found.append(Row(document, *cells))
-        table = bool(cells) and (table or cells[0] == "described")
-    return found
-
-
-def commands(document: str) -> list[tuple[str, int]]:
-    """Of a document's rows: each once, with its exit code."""
-    text = "\n".join(row.command for row in rows() if row.document == document).replace("\\|", "|")
-    return list({words: int(code or 0) for words, code in COMMAND.findall(text)}.items())
+MOST_WORDS = 2500
 
 
 def anchors(page: Path) -> set[str]:
@@ -63,40 +29,40 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-def test_every_document_has_its_rows_and_every_row_its_columns() -> None:
-    assert {row.document for row in rows()} == set(DOCUMENTS)
-    for row in rows():
-        assert (
-            row.described and row.there and row.state in ("works", "tested", "partial", "outside")
-        ), row
-        assert (row.state == "outside") == (not row.command), row
-        assert COMMAND.sub("", row.command).strip(" ;") == "", row
-        assert (row.state == "tested") == row.command.startswith("`python -m pytest"), row
-        if row.state == "partial":
-            assert "(log/" in row.here, row  # where its bound is
-        if row.state == "outside":
-            assert row.here, row  # the reason
-        else:
-            assert row.ours.startswith("`"), row
+def test_the_page_is_made_of_the_data_and_short() -> None:
+    """`python -m tests.seeds --write` makes it."""
+    text = page_of(DOCUMENTS)
+    assert PAGE.read_text() == text
+    assert len(text.split()) < MOST_WORDS
 
 
-def test_the_count_at_the_top_is_that_of_the_rows() -> None:
-    states = [row.state for row in rows()]
-    told = re.search(
-        r"(\d+) rows: (\d+) work, (\d+) are tested, (\d+) are partial, (\d+) are outside",
-        PAGE.read_text(),
-    )
-    assert told is not None
-    counts = [len(states), *(states.count(s) for s in ("works", "tested", "partial", "outside"))]
-    assert [int(number) for number in told.groups()] == counts
+def test_every_document_has_its_rows_and_every_row_what_its_state_asks_for() -> None:
+    assert [document.key for document in DOCUMENTS] == ["000", "001", "003", "004"]
+    assert len({(row.document, row.part, row.what) for row in ROWS}) == len(ROWS)
+    for row in ROWS:
+        assert row.what and row.there and row.state in STATES, row
+        tests = [shlex.split(run.run)[:3] == ["python", "-m", "pytest"] for run in row.runs]
+        assert (row.state == "outside") == (not row.runs), row
+        assert (row.state in ("bounded", "outside")) == bool(row.bound), row
+        assert row.state != "tested" or all(tests), row
+        assert row.state != "works" or not all(tests), row
+        assert bool(row.code) == (row.state != "outside"), row
+
+
+def test_figures_say_what_they_are_and_how_near_they_must_be() -> None:
+    """No tolerance is wider than a third of its figure, but of small counts."""
+    for row in ROWS:
+        for figure in row.figures:
+            assert figure.reads.count("{}") == 1 and figure.unit, row
+            assert figure.within <= max(abs(figure.is_) / 3.0, 1.0), row
 
 
 def test_files_tests_and_anchors_that_rows_name_exist() -> None:
-    for row in rows():
-        for path in re.findall(r"`([^`]+)`", row.ours):
+    for row in ROWS:
+        for path in row.code.split():
             assert (ROOT / path).exists(), path
-        for words, _ in COMMAND.findall(row.command):
-            for path in re.findall(r"\btests/\S+", words):
+        for run in row.runs:
+            for path in re.findall(r"\btests/\S+", run.run):
                 assert (ROOT / path).exists(), path
     for file, anchor in LINK.findall(PAGE.read_text()):
         page = PAGE.parent / file if file else PAGE
@@ -104,27 +70,40 @@ def test_files_tests_and_anchors_that_rows_name_exist() -> None:
         assert not anchor or anchor in anchors(page), f"{file}#{anchor}"
 
 
+def test_commands_parse(parsed: list[str]) -> None:  # noqa: F811
+    """With every option, but not run."""
+    from poise.training.cli.entry import main
+
+    runs = [run for run in runs_of(ROWS) if run.run.startswith("poise ")]
+    for run in runs:
+        assert main(shlex.split(run.run)[1:]) == 0, run.run
+    assert len(parsed) == len(runs)
+
+
+def test_figures_are_read_and_compared() -> None:
+    """A number where the text is, also across lines and columns; one off by more is a fault."""
+    figure = Figure("speed: {} m/s", 0.5, 0.02, "m/s")
+    assert figure.read("x\nspeed:\t0.513\n m/s") == 0.513
+    assert Figure("│ pd │ {} │", 0.0, 0.0, "").read("│ 1 │ pd   │   0.44 │ 3 │") == 0.44
+    assert figure.holds(0.519) and not figure.holds(0.521) and not figure.holds(0.47)
+    with pytest.raises(ValueError, match="no 'speed"):
+        figure.read("velocity: 0.5 m/s")
+    run = next(run for run in DAILY if run.exit == 0)
+    assert list(faults(run, 1, "")) and list(faults(run, 0, "nothing"))
+
+
+@pytest.mark.parametrize("run", DAILY, ids=[run.run for run in DAILY])
+def test_daily_figures_hold(run, tmp_path: Path) -> None:
+    code, output = run_here(run, prepare(tmp_path))
+    assert list(faults(run, code, output)) == []
+
+
 @pytest.mark.weekly
-@pytest.mark.parametrize("document", DOCUMENTS)
-def test_every_command_runs(document: str, tmp_path: Path, can_render: None) -> None:
+@pytest.mark.parametrize("document", DOCUMENTS, ids=[document.key for document in DOCUMENTS])
+def test_every_figure_holds(document: Document, tmp_path: Path, can_render: None) -> None:
     """In order, in one folder: a command may need what an earlier one of the document wrote."""
-    for folder in ("configs", "docs", "tests"):
-        (tmp_path / folder).symlink_to(ROOT / folder)
-    poise = str(Path(sys.executable).with_name("poise"))
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    wrong = []
-    for command, code in commands(document):
-        words = shlex.split(command)
-        program = [poise] if words[0] == "poise" else [sys.executable]
-        place = ROOT if words[1:3] == ["-m", "pytest"] else tmp_path
-        done = subprocess.run(
-            [*program, *words[1:]],
-            cwd=place,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode != code:
-            wrong.append(f"{command}: {done.returncode}\n{done.stdout[-500:]}{done.stderr[-1500:]}")
+    place = prepare(tmp_path)
+    wrong = [
+        fault for run in runs_of(document.rows) for fault in faults(run, *run_alone(run, place))
+    ]
     assert not wrong, "\n\n".join(wrong)

@@ -6,8 +6,8 @@
 Robots with a packaged description are loaded by name, all others from their model alone
 (`poise.envs.robots.guess`). Each is refused in one line, or stands 20 s from an ordinary start with
 momentum-qp and is pushed on its trunk for 0.1 s: with momentum-qp, whose feet stay, and with
-capture-step, by bisection in four directions from one start each. The table goes to docs/robots.md
-with `--write`.
+capture-step, by bisection in four directions from one start each. With `--write` the table goes to
+docs/log/fleet.md.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ MODELS = (
     "cmeel.prefix/share/example-robot-data/robots/alex*_description/urdf/*.urdf",
     "cmeel.prefix/share/example-robot-data/robots/g1_description/urdf/*.urdf",
 )
-PAGE = Path(__file__).parents[2] / "docs/robots.md"
+PAGE = Path(__file__).parents[2] / "docs/log/fleet.md"
 BEGIN, END = "<!-- fleet: by make fleet -->", "<!-- end of fleet -->"
 QUIET = 20.0  # [s]
 DIRECTIONS = (0.0, 90.0, 180.0, 270.0)
@@ -173,7 +173,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--only", default="", help="of models whose path matches it (re)")
     parser.add_argument("--stand", action="store_true", help="without pushes: minutes")
-    parser.add_argument("--write", action="store_true", help="the table to docs/robots.md")
+    parser.add_argument("--write", action="store_true", help="the table to docs/log/fleet.md")
     given = parser.parse_args()
     site = Path(np.__file__).parents[1]
     shares = [str(folder.absolute() / WHEELS) for folder in given.folders]

@@ -110,6 +110,27 @@ def write_graph(
     return path
 
 
+def within(
+    path: Path, inputs: int, metadata: dict[str, str] | None = None, **outputs: np.ndarray
+) -> Path:
+    """A network that gives rows of these arrays by `time_step`, the last one beyond them."""
+    actions = outputs["joint_pos"].shape[1]
+    last = np.array([len(next(iter(outputs.values()))) - 1], np.float32)
+    weights = {"last": last, "W": np.zeros((inputs, actions), np.float32)}
+    nodes = [helper.make_node("Min", ["time_step", "last"], ["low"]),
+             helper.make_node("Cast", ["low"], ["index"], to=7),
+             helper.make_node("MatMul", ["obs", "W"], ["actions"])]  # fmt: skip
+    ends = [("actions", [1, actions], 1)]
+    for name, rows in outputs.items():
+        weights[f"all_{name}"] = rows.astype(np.float32)
+        nodes.append(helper.make_node("Gather", [f"all_{name}", "index"], [f"two_{name}"], axis=0))
+        weights.setdefault("ones", np.array([0]))
+        nodes.append(helper.make_node("Squeeze", [f"two_{name}", "ones"], [name]))
+        ends.append((name, [1, *rows.shape[1:]], 1))
+    sides: list[Any] = [("obs", [1, inputs], 1), ("time_step", [1, 1], 1)]
+    return write_graph(path, nodes, weights, sides, ends, metadata)
+
+
 def write_yaml(path: Path, **fields: Any) -> Path:
     """A YAML file of these fields."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -20,7 +20,7 @@ from poise.training.running.options.arguments import (
 from poise.training.running.terminal import terminal
 
 from .policies import dataset, export
-from .results import compare, leaderboard, replay, report
+from .results import compare, gallery, leaderboard, replay, report
 from .view import view
 from .walk import gait, walk
 
@@ -77,6 +77,8 @@ def evaluate(
     write_limits: Path | None = None,
     motions: tuple[str, ...] = (),
     realism: str | None = None,
+    get_up: bool = False,
+    physics: str | None = None,
     overwrite: Overwrite = False,
     json: Json = False,
     allow: Allow = (),
@@ -107,11 +109,15 @@ def evaluate(
             .yaml files; its own if not given.
         realism: how real the robot is: ideal (its state is known exactly and at once), lab, field,
             or a .yaml file of a level; that of the suite if not given.
+        get_up: a robot that falls has 10 s to get up again: up again, and in what time, are
+            figures of their own.
+        physics: the engine that steps the robot: mujoco, drake (needs poise[drake]), or a .yaml
+            file of its settings; that of the suite if not given.
     """
     from poise.configs.outputs import check_out_file
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite, realism=realism)
+    check_names(controllers, robot=robot, suite=suite, realism=realism, physics=physics)
     from poise.training.benchmarking.evaluation.evaluate import evaluate, measured_limits
 
     if write_limits is not None:
@@ -119,8 +125,8 @@ def evaluate(
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, limits=limits, motions=motions, realism=realism, overwrite=overwrite,
-        console=terminal(stderr=json), allow=allow,
+        trials=trials, limits=limits, motions=motions, realism=realism, get_up=get_up,
+        physics=physics, overwrite=overwrite, console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
@@ -142,6 +148,7 @@ def benchmark(
     backend: Backend = "local",
     trials: int | None = None,
     realism: str | None = None,
+    physics: str | None = None,
     overwrite: Overwrite = False,
     report: bool = True,
     submit: Path | None = None,
@@ -166,6 +173,7 @@ def benchmark(
         trials: at most as many in every cell of the suite, to try things out; of a suite of one
             part, its number.
         realism: ideal, lab, field or a .yaml file of a level; that of the suite if not given.
+        physics: mujoco, drake or a .yaml file of its settings; that of the suite if not given.
         report: write report.html at the end, as poise report does.
         submit: play nothing, but check this finished folder and pack it, without any code, into a
             .zip beside it: the issue form for results takes that.
@@ -185,13 +193,13 @@ def benchmark(
     from poise.baselines.allowance import named
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite, realism=realism)
+    check_names(controllers, robot=robot, suite=suite, realism=realism, physics=physics)
     from poise.training.benchmarking.evaluation.evaluate import benchmark
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, realism=realism, overwrite=overwrite, console=terminal(stderr=json),
-        allow=allow,
+        trials=trials, realism=realism, physics=physics, overwrite=overwrite,
+        console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     code = _raised(summary, out)
     if json:
@@ -354,14 +362,14 @@ def list_names(*, json: Json = False) -> None:
     """List what can be named: robots, controllers, policies with their J50, suites and the like."""
     from poise.baselines.motion.clips.library import packaged_clips
     from poise.baselines.motion.synthesis.scripts.library import packaged_scripts
-    from poise.training.running.options.names import named
+    from poise.training.running.options.names import named, suites_of_j50
     from poise.training.running.options.pages import print_names
 
     more = {"clips": packaged_clips(), "scripts": packaged_scripts()}
     if json:
         print_json({**named(), **more})
         return
-    print_names(named(), terminal())
+    print_names(named(), suites_of_j50(), terminal())
     for kind, names in more.items():
         print(f"{kind}: {', '.join(names)}")
     print("also as controllers: zero, a folder written by poise train, my_file.py:Class")
@@ -379,6 +387,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "view": view,
     "replay": replay,
     "report": report,
+    "gallery": gallery,
     "tune": tune,
     "qp-set": qp_set,
     "export": export,

@@ -41,8 +41,8 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a sub-command; returns 0, 1 (see `evaluate`), 2 after bad input or on a full disk, 130
-    after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
+    """Run a sub-command; returns 0, 1 (a fall, an error, a no), 2 after bad input or on a full
+    disk, 130 after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
     args = list(sys.argv[1:] if args is None else args)
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

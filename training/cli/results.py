@@ -1,4 +1,4 @@
-"""The sub-commands that read finished results: compare, leaderboard, replay and report."""
+"""The sub-commands that read finished results: compare, gallery, leaderboard, replay, report."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -115,6 +115,8 @@ def _print_replay(done: "Replay") -> None:
     from poise.training.benchmarking.diagnosis.words import push_told, why
 
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
+    if done.outcome.loss == "off command":
+        end = "upright, not as commanded"
     print(f"trial {done.trial.number}, {done.controller}: {end}")
     events: list[Push | Kick] = [*done.trial.pushes, *done.trial.kicks]
     events.sort(key=lambda each: each.start)
@@ -150,3 +152,32 @@ def report(
     if out is not None:
         check_out_file(out)
     write_report(folder, out, films=films, console=terminal(), allow=allow)
+
+
+def gallery(
+    folder: Folder,
+    /,
+    *,
+    out: Path,
+    controllers: tuple[str, ...] = (),
+    sizes: int = 4,
+    allow: Allow = (),
+) -> None:
+    """Write one HTML file that plays pushes of a result: choose direction, size and controller.
+
+    The file opens from disk and needs neither server nor network.
+
+    Args:
+        folder: written by poise evaluate or poise benchmark.
+        out: the HTML file.
+        controllers: which of the evaluated ones, from left to right; the best four if not given.
+        sizes: pushes in each of eight directions, from the smallest to the largest.
+    """
+    from poise.configs.outputs import check_out_file
+
+    check_folders(folder)
+    check_out_file(out)
+    from poise.training.pictures.gallery.page import write_gallery
+
+    write_gallery(folder, out, controllers=controllers, sizes=sizes, console=terminal(),
+                  allow=allow)  # fmt: skip

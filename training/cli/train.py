@@ -11,7 +11,7 @@ from typing import Annotated, get_type_hints
 
 import tyro
 
-from poise.baselines.allowance import named
+from poise.baselines.allowance import allow_words, named
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
 from poise.configs.reading import exists, is_file
@@ -19,6 +19,7 @@ from poise.configs.schema import build, to_dict
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.statistics.differences import difference
 from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.trials.agents import code_of
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy_files import BEST, last_state
 from poise.training.learning.seeds.records import SEEDS, Evaluation, evaluations, start_and_best
@@ -143,7 +144,7 @@ def gained(start: Evaluation, best: Evaluation, trials: int) -> str:
 def next_commands(config: TrainConfig, out: Path, shown: Path) -> list[str]:
     """How to measure what was trained into `out` on pushes of its own, and how to look at it."""
     robot = [] if config.robot == HUMANOID else ["--robot", config.robot]
-    allow = [word for name in named(config.controller) for word in ("--allow", name)]
+    allow = allow_words(code_of(config.controller) if config.controlled else ())
     names = [config.controller, str(out)] if config.controlled else [str(out)]
     suite = ["--suite", "walk-push"] if config.action == "walk" else []
     to = ["--out", str(Path("out") / out.name)]

@@ -31,9 +31,10 @@ def walk(
     controller: str = "walk",
     terrain: str = "flat",
     realism: str | None = None,
+    physics: str | None = None,
     video: Path | None = None,
     allow: Allow = (),
-) -> None:
+) -> int:
     """Walk at a commanded speed, pushed or not, and say how well: speed, steps, cost, falls.
 
     Args:
@@ -52,7 +53,11 @@ def walk(
         controller: one that walks: a name, a .yaml file, or a folder written by poise train.
         terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs, rise: 0.15}".
         realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
+        physics: the engine that steps the robot: mujoco, drake, or a .yaml file of its settings.
         video: an MP4 or WebP file to write.
+
+    Returns:
+        0 if the robot is upright at the end, 1 if it fell.
     """
     if not 0.0 < duration < math.inf:
         raise ConfigError(f"must be above 0 and finite, not {duration:g}", field="duration")
@@ -62,15 +67,18 @@ def walk(
         choose_gl_backend()
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names([controller], robot=robot, realism=realism)
+    check_names([controller], robot=robot, realism=realism, physics=physics)
     from poise.training.pictures.sessions.walk import walk
 
     command = {"ahead": speed, "left": left, "turn": math.radians(turn), "step_time": step_time,
                "step_length": step_length, "width": width, "clearance": clearance,
                "arm_swing": arm_swing}  # fmt: skip
-    walk(command, duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
-         realism=realism, push=push, push_at=push_at, seed=seed, video=video, say=_say,
-         allow=allow)  # fmt: skip
+    outcome = walk(
+        command, duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
+        realism=realism, physics=physics, push=push, push_at=push_at, seed=seed, video=video,
+        say=_say, allow=allow,
+    )  # fmt: skip
+    return 1 if outcome.fallen else 0
 
 
 def _terrain(text: str) -> str | dict[str, object]:

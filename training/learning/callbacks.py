@@ -2,6 +2,7 @@
 
 import time
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -64,13 +65,22 @@ class Checkpoints(BaseCallback):
     """Writes last/ after every rollout, and best/ after the best evaluation of what was trained.
 
     With `keep_every` of the configuration a policy is also kept in kept/STEPS, at the start and
-    whenever so many more steps are done. All are in the folder `out` of the run.
+    whenever so many more steps are done. All are in the folder `out` of the run. `say` is called
+    with what an evaluation is doing, a few words.
     """
 
     model: PPO
 
-    def __init__(self, config: TrainConfig, robot: Robot, out: Path, state: dict[str, Any]):
+    def __init__(
+        self,
+        config: TrainConfig,
+        robot: Robot,
+        out: Path,
+        state: dict[str, Any],
+        say: Callable[[str], object] = lambda _: None,
+    ):
         super().__init__()
+        self._say = say
         self.config, self.robot = config, robot  # as it is described, whatever it is trained on
         self.out = out
         self.rows: list[dict[str, float]] = list(state.get("evaluations", []))
@@ -139,6 +149,7 @@ class Checkpoints(BaseCallback):
             chunk = [int(s) for s in seeds[start : start + size]]
             chunk += [int(seeds[0])] * (size - len(chunk))  # filled up, not counted
             counted = min(size, evaluation.trials - start)
+            self._say(f"evaluating: {start}/{evaluation.trials} pushes")
             batch.reset(chunk)
             result: dict[int, tuple[bool, bool]] = {}
 
@@ -155,6 +166,7 @@ class Checkpoints(BaseCallback):
                 actions.extend(np.abs(action[running]).mean(axis=1))
                 batch.step(action, at_end)
             ends.extend(result[i] for i in range(counted))
+        self._say("")
         rate, fallen = (float(share) for share in np.mean(ends, axis=0))
         return {
             "recovered": rate,
@@ -192,19 +204,31 @@ class Checkpoints(BaseCallback):
 
 
 class Progress(BaseCallback):
-    """A progress bar with the recovery rate of the latest episodes and steps per second."""
+    """A progress bar with the recovery rate of the latest episodes and steps per second.
 
-    def __init__(self, total: int):
+    Its total is the end of the last rollout. It comes before `Checkpoints`, which evaluates at the
+    start, and is told so by `say`.
+    """
+
+    def __init__(self, config: TrainConfig):
         super().__init__()
-        self.total = total
+        rollout = config.ppo.n_envs * config.ppo.n_steps
+        self.steps, self.rollout = config.steps, rollout
         self._episodes: deque[bool] = deque(maxlen=500)
         self._bar: ProgressLines | None = None
 
     def _on_training_start(self) -> None:
         self._bar = steps_bar("training")
         self._bar.start()
-        self._task = self._bar.add_task("", total=self.total, completed=self.num_timesteps, rate="")
-        self._start, self._start_steps = time.perf_counter(), self.num_timesteps
+        done = self.num_timesteps
+        total = done + self.rollout * -(-max(self.steps - done, 0) // self.rollout)
+        self._task = self._bar.add_task("", total=total, completed=done, rate="")
+        self._start, self._start_steps, self._rate = time.perf_counter(), done, ""
+
+    def say(self, text: str) -> None:
+        """Show this in place of the rates; nothing: the rates again."""
+        if self._bar is not None:
+            self._bar.update(self._task, rate=text or self._rate)
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
@@ -216,16 +240,12 @@ class Progress(BaseCallback):
         seconds = time.perf_counter() - self._start
         speed = (self.num_timesteps - self._start_steps) / max(seconds, 1e-9)
         # of the policy that explores, under the curriculum's pushes: no held-out rate
-        rate = f"recovered in training {np.mean(self._episodes):.0%}" if self._episodes else ""
+        rate = f"recovered in training {np.mean(self._episodes):.0%}, " if self._episodes else ""
+        self._rate = f"{rate}{speed:,.0f}/s"
         assert self._bar is not None  # made at the start of the training
-        self._bar.update(
-            self._task, completed=self.num_timesteps, rate=f"{rate}  {speed:,.0f} steps/s"
-        )
-
-    def _on_training_end(self) -> None:
-        self.close()
+        self._bar.update(self._task, completed=self.num_timesteps, rate=self._rate)
 
     def close(self) -> None:
-        """Give the terminal back, after an error too."""
+        """Give the terminal back, after the last evaluation and after an error too."""
         if self._bar is not None:
             self._bar.stop()

@@ -104,14 +104,13 @@ def train(
             normalize.seed(_env_seed(seed))
         write_atomic(out / CONFIG, to_yaml(config))
         model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-        checkpoints = Checkpoints(config, robot, out, state)
+        bar = Progress(config)
+        stack.callback(bar.close)
+        checkpoints = Checkpoints(config, robot, out, state, bar.say)
         stack.callback(checkpoints.close)
         given = [callback] if isinstance(callback, BaseCallback) else list(callback)
-        callbacks = [RolloutLog(), ScheduleCallback(config), checkpoints, *given]
-        bar = Progress(config.steps)
-        stack.callback(bar.close)
-        if progress:
-            callbacks.append(bar)
+        shown = [bar] if progress else []
+        callbacks = [*shown, RolloutLog(), ScheduleCallback(config), checkpoints, *given]
         remaining = config.steps - model.num_timesteps
         if remaining > 0:
             model.learn(remaining, callback=callbacks, reset_num_timesteps=checkpoint is None)

@@ -100,7 +100,8 @@ def _mm(key: str, name: str, words: str, form: str = ".1f") -> Figure:
     return Figure(key, name, form, "mm", words, 1e3)
 
 
-TRIED = (Figure("trials", "trials", ".0f"), Figure("recovered", "recovered", ".0f"))
+TRIED = (Figure("trials", "trials", ".0f"),
+         Figure("recovered", "won", ".0f", words="recovered; of walks, not fallen"))  # fmt: skip
 J50 = Figure("j50", "J50", ".1f", "N·s", "impulse that half of the trials survive",
              ends="j50_ci95", bound="j50_bound")  # fmt: skip
 
@@ -116,17 +117,35 @@ J50_BOUNDED = Figure("j50_bounded", "bounds", ".0f", words="directions where J50
 ETA_MEAN = Figure("eta_mean", "η mean", ".2f", words="J50 over the ankle limit, mean of all",
                   ends="eta_mean_ci95")  # fmt: skip
 ETA_WORST = Figure("eta_min", "η worst", ".2f", words="in the worst direction", csv="eta_worst")
-HALF_AT = Figure("fraction50", "half at", ".2f", words="half of the pushes of this fraction of the "
-                 "limit are recovered", bound="fraction50_bound")  # fmt: skip
+#: in units of what pushes are measured by, which whoever shows it names
+HALF_AT = Figure("fraction50", "J50", ".2f", "limit", "half of pushes of this size are recovered",
+                 ends="fraction50_ci95", bound="fraction50_bound")  # fmt: skip
 RECOVERED = Figure("recovered_rate", "recovered", ".0%", words="fraction of all trials",
                    ends="recovered_ci95")  # fmt: skip
+#: of a walk; the same key: whether the last strides are as near to the command as its own
+AS_COMMANDED = replace(
+    RECOVERED,
+    name="as commanded again",
+    words="fraction of all trials whose "
+    "last strides are as near to the command as those before the push",
+)
 ERRORS = Figure("errors", "errors", ".0f", words="trials in which a controller raised an error",
                 where=_some("errors"))  # fmt: skip
 FAILURES = Figure("solver_failures", "solver failures", ".0f", words="ticks at which no QP was "
                   "solved", where=_some("solver_failures"))  # fmt: skip
 STEPS_TAKEN = Figure("steps_mean", "steps, mean", ".1f", where=_some("steps_mean"))
-NEVER_FELL = Figure("never_fell_rate", "never fell", ".1%", ends="never_fell_ci95",
-                    where=lambda e: "j50_mean" not in e and "fraction50" not in e)  # fmt: skip
+NOT_FALLEN = Figure("never_fell_rate", "not fallen", ".0%", words="fraction of all trials",
+                    ends="never_fell_ci95")  # fmt: skip
+UP_AGAIN = (
+    Figure(
+        "up_again_rate",
+        "up again",
+        ".0%",
+        words="fraction of the robots that were down, by a fall or from the start",
+        ends="up_again_ci95",
+    ),
+    Figure("up_time_median", "time to get up", ".1f", "s", "median"),
+)
 AT_REST = (
     _mm("com_drift_max", "CoM drift", "largest"),
     _mm("foot_drift_max", "feet drift", "largest"),
@@ -155,8 +174,7 @@ ROBUST = (
 
 # of a scenario
 SPEED = Figure("speed_ahead", "speed", ".2f", "m/s", "ahead, mean over the strides")
-STOOD = Figure("never_fell_rate", "stood", ".0%", "", "trials without a fall",
-               ends="never_fell_ci95")  # fmt: skip
+STOOD = replace(NOT_FALLEN, name="stood", words="trials without a fall")
 
 # of training seeds taken together
 OVER_SEEDS = (
@@ -174,6 +192,7 @@ AT_LEVEL = (
     replace(J50_MEAN, words=""),
     J50_KEPT,
     RECOVERED,
+    NOT_FALLEN,
     Figure("stood", "stood", ".0f", words="unpushed, without a fall", of="unpushed"),
     CHATTER,
     ENERGY,
@@ -184,13 +203,18 @@ LOSSES = Figure("trials", "losses", ".0f")
 
 # of two controllers, or of a level and the standard case, on the same trials
 PAIRED = (
-    Figure("both", "both", ".0f", words="recovered by both"),
+    Figure("both", "both", ".0f", words="recovered by both, of walks not fallen with either"),
     Figure("only_a", "only a (lost)", ".0f", words="lost by b"),
     Figure("only_b", "only b (won)", ".0f", words="won by b"),
     Figure("neither", "neither", ".0f"),
 )
 AGAINST = (
-    Figure("lost", "lost", ".0f", words="trials that the other one recovers, and this not"),
+    Figure(
+        "lost",
+        "lost",
+        ".0f",
+        words="trials that the other one recovers (of walks: does not fall), and this not",
+    ),
     Figure("won", "won", ".0f", words="trials that this recovers, and the other one not"),
 )
 LOST_WON = Figure("only_a", "lost, won", ".0f", beside="only_b",
@@ -202,7 +226,7 @@ GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", end
 AIMED = (
     J50,
     Figure("j90", "J90", ".1f", "N·s", ends="j90_ci95"),
-    replace(HALF_AT, ends="fraction50_ci95"),
+    HALF_AT,
     Figure("ankle_limit", "ankle limit", ".1f", "N·s"),
     Figure("eta", "η", ".2f"),
     *(
@@ -236,8 +260,9 @@ FALLS = (
     Figure("fallen", "fell", ".0f", of="trials"),
     Figure("falls_per_minute", "falls a minute", ".2f", words="Garwood's interval",
            ends="falls_per_minute_ci95"),
-    Figure("recovered_rate", "as told", ".0%", words="fraction of trials that end as commanded",
-           ends="recovered_ci95"),
+    replace(NOT_FALLEN, words="fraction of the trials"),
+    replace(AS_COMMANDED, name="as commanded", words="fraction of trials whose last strides are as "
+            "near to the command as its own before the push; unpushed, within 0.05 m/s and 5 °/s"),
 )  # fmt: skip
 FOLLOWED = (
     Figure("speed_ahead", "ahead", ".3f", "m/s", "mean over the strides"),
@@ -246,6 +271,9 @@ FOLLOWED = (
     Figure("speed_error_rms", "RMS error", ".3f", "m/s",
            "of the strides' velocities from the command"),
     Figure("turn_error_rms", "of the turn", ".3f", "rad/s", "root mean square over the strides"),
+    Figure("own_speed_error", "own error", ".3f", "m/s",
+           "largest of a stride before the push: the tracking error of the controller itself"),
+    Figure("last_speed_error", "last error", ".3f", "m/s", "of the last two strides"),
     Figure("circle_error", "off the circle", ".3f", "m", "largest distance"),
     Figure("surfaces_passed", "surfaces passed", ".1f", words="of the terrain, mean"),
     Figure("edge_contacts", "edges touched", ".2f",
@@ -295,4 +323,24 @@ IN_MOTION = (
            ends="share50_ci95", bound="share50_bound"),
     Figure("over_standing", "over standing", ".2f", words="J50 in motion over J50 standing",
            ends="over_standing_ci95", bound="share50_bound"),
+)  # fmt: skip
+
+# of pushes that last, and of gusts
+HELD = (
+    TRIED[0],
+    Figure("never_fell_rate", "held", ".0%", words="trials without a fall",
+           ends="never_fell_ci95"),
+    Figure("f50", "F50", ".1f", "N", "largest force of a push that half of the trials hold",
+           ends="f50_ci95", bound="f50_bound"),
+    Figure("f50_per_mass", "F50/m", ".2f", "N/kg", "the same over the robot's mass"),
+    replace(RECOVERED, name="at rest again", words="fraction of all trials, at the end"),
+)  # fmt: skip
+GUSTS = (
+    TRIED[0],
+    Figure("never_fell_rate", "never fell", ".0%", words="trials without a fall",
+           ends="never_fell_ci95"),
+    Figure("survived_mean", "gusts survived", ".2f", words="mean over the trials",
+           ends="survived_ci95", of="pushes"),
+    Figure("first_survived", "the first", ".0f", words="trials that survive the first gust"),
+    HELD[-1],
 )  # fmt: skip

@@ -15,6 +15,8 @@ from .provenance import Circumstances
 from .trial_figures import (
     Bound,
     Counts,
+    Criterion,
+    GustFigures,
     InMotion,
     Interval,
     MotionLevel,
@@ -22,6 +24,7 @@ from .trial_figures import (
     PhaseJ50,
     Rate,
     ScenarioFigures,
+    SustainedFigures,
     WalkLevel,
 )
 
@@ -151,6 +154,7 @@ class Fractions(TypedDict, total=False):
 
     fraction_of: str
     fraction50: float
+    fraction50_ci95: Interval
     fraction50_bound: Bound
     sectors: list[Sector]
 
@@ -163,11 +167,14 @@ class Loss(TypedDict):
 
 
 class Entry(Counts, EnvelopeFigures, Fractions, total=False):
-    """A controller. The counts are of the part that is rated, else of all trials. Of all are
-    `played`, `errors`, in which it raised, and `losses`, the most frequent cause first."""
+    """A controller. The counts are of the part that is rated, else of all trials, of pushed walks
+    of those that all controllers meet. Of all are `played`, `errors`, in which it raised, and
+    `losses`, the most frequent cause first. J50, the ranking, pairs and losses go by the
+    `criterion`; results of before it was written go by "recovered"."""
 
     played: Required[int]
     errors: Required[int]
+    criterion: Criterion
     losses: list[Loss]
     tick_us: Number
     fingerprint: str
@@ -180,6 +187,8 @@ class Entry(Counts, EnvelopeFigures, Fractions, total=False):
     levels: list[RealismLevel]
     in_motion: list[InMotion]
     scenarios: list[ScenarioFigures]
+    sustained: list[SustainedFigures]
+    gusts: GustFigures
 
 
 class Paired(TypedDict, total=False):
@@ -252,9 +261,11 @@ class RobotFigures(TypedDict):
 
 
 class Summary(Circumstances):
-    """summary.json; `realism` is the level of a suite where that is not ideal."""
+    """summary.json; `realism` is the level of a suite where that is not ideal, `physics` the engine
+    where that is not MuJoCo."""
 
     realism: NotRequired[str]
+    physics: NotRequired[str]
     format: int
     suite: str
     seed: int

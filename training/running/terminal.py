@@ -19,6 +19,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.segment import Segment
+from rich.table import Column
 
 from poise.configs.errors import PoiseWarning
 from poise.configs.texts import printable
@@ -83,7 +84,7 @@ def terminal(stderr: bool = False) -> Console:
 
 
 class ProgressLines(Progress):
-    """A bar in a terminal; elsewhere plain lines, the more seldom the longer it takes."""
+    """A bar in a terminal; elsewhere plain lines, the first at once, then ever more seldom."""
 
     _started = _due = -1.0  # [s], monotonic
 
@@ -94,7 +95,7 @@ class ProgressLines(Progress):
             return
         now = time.monotonic()
         if self._started < 0.0:
-            self._started, self._due = now, now + SHORTEST
+            self._started = self._due = now
         if now >= self._due:
             self._due = now + min(max(GROWTH * (now - self._started), SHORTEST), LONGEST)
             for task in self.tasks:
@@ -105,20 +106,25 @@ class ProgressLines(Progress):
 
 
 def progress_bar(console: Console) -> Progress:
-    """A bar, or lines, with trials, recovery rates (its field `rates`) and the time left."""
-    rates = TextColumn("recovered: {task.fields[rates]}", markup=False)
-    return _bar("trials", [MofNCompleteColumn(), rates], console)
+    """A bar, or lines, with trials, the time left and recovery rates (its field `rates`)."""
+    return _bar(
+        "trials", MofNCompleteColumn(), "not fallen, recovered: {task.fields[rates]}", console
+    )
 
 
 def steps_bar(label: str, console: Console | None = None) -> ProgressLines:
-    """A bar, or lines, with steps of a training, rates (its field `rate`) and the time left."""
-    steps = TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps")
-    return _bar(label, [steps, TextColumn("{task.fields[rate]}")], console)
+    """A bar, or lines, with steps of a training, the time left and rates (its field `rate`)."""
+    steps = TextColumn("{task.completed:,.0f}/{task.total:,.0f}")
+    return _bar(label, steps, "{task.fields[rate]}", console)
 
 
-def _bar(label: str, told: list[ProgressColumn], console: Console | None) -> ProgressLines:
-    columns = (TextColumn(label), BarColumn(), *told, TimeRemainingColumn())
-    return ProgressLines(*columns, console=console, disable=console is not None and console.quiet)
+def _bar(label: str, count: ProgressColumn, rates: str, console: Console | None) -> ProgressLines:
+    """What is longest stands last, in what room is left: it is cut, the time is not."""
+    console = console or Console()
+    width = 40 if console.width >= WIDTH else 10
+    last = TextColumn(rates, markup=False, table_column=Column(ratio=1, no_wrap=True))
+    columns = (TextColumn(label), BarColumn(width), count, TimeRemainingColumn(), last)
+    return ProgressLines(*columns, console=console, disable=console.quiet, expand=True)
 
 
 def print_paths(paths: Sequence[Path], console: Console) -> None:

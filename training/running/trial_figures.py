@@ -11,21 +11,40 @@ Interval = tuple[Number, Number]
 Bound = Literal["lower", "upper"] | None  # where a fit is only a bound
 
 
+#: what J50, rankings and pairs of a controller count: of walks that it has not fallen, of all else
+#: that it has recovered
+Criterion = Literal["not fallen", "recovered"]
+NOT_FALLEN: Criterion = "not fallen"
+RECOVERED: Criterion = "recovered"
+
+
 class Rate(TypedDict):
-    """The number of recovered trials, and their rate."""
+    """The number of recovered trials, and of those without a fall, and their rates.
+
+    Those without a fall or an error are not in older results of all parts.
+    """
 
     trials: int
     recovered: int
     recovered_rate: float
     recovered_ci95: Interval
+    fallen: NotRequired[int]
+    never_fell_rate: NotRequired[float]
+    never_fell_ci95: NotRequired[Interval]
 
 
-class Counts(Rate, total=False):
+class Rising(TypedDict, total=False):
+    """Robots that were down, by a fall or from the start, and how many were up again."""
+
+    downs: int
+    up_again_rate: float
+    up_again_ci95: Interval
+    up_time_median: Number
+
+
+class Counts(Rate, Rising, total=False):
     """Counts of how trials ended, and medians of what was recorded."""
 
-    fallen: int
-    never_fell_rate: float
-    never_fell_ci95: Interval
     recovered_with_step: int
     recovered_in_place: int
     steps_mean: Number
@@ -51,6 +70,11 @@ class Counts(Rate, total=False):
 
 class WalkMeans(TypedDict, total=False):
     """Means over the trials of a level, see `Outcome`."""
+
+    own_speed_error: Number
+    own_turn_error: Number
+    last_speed_error: Number
+    last_turn_error: Number
 
     speed_ahead: Number
     speed_left: Number
@@ -87,9 +111,6 @@ class WalkLevel(Rate, StepsAsTold, WalkMeans, total=False):
 
     part: str
     level: str
-    fallen: int
-    never_fell_rate: float
-    never_fell_ci95: Interval
     minutes: float
     falls_per_minute: Number
     falls_per_minute_ci95: Interval | None
@@ -159,3 +180,24 @@ class ScenarioFigures(Counts):
 
     scenario: str
     speed_ahead: NotRequired[Number]
+
+
+class SustainedFigures(Counts):
+    """Pushes of seconds, of all profiles or of one. F50 [N] is the largest force of a push that
+    half of the trials hold without a fall."""
+
+    profile: str
+    f50: float
+    f50_ci95: Interval
+    f50_bound: Bound
+    f50_per_mass: float
+
+
+class GustFigures(Counts):
+    """Trials of `pushes` gusts at most: the mean number that is survived, and the trials that
+    survive the first one."""
+
+    pushes: int
+    survived_mean: float
+    survived_ci95: Interval
+    first_survived: int

@@ -72,7 +72,7 @@ def update_targets(
     """Fill `t` for the motion's `time` [s]: its joints and CoM, moved by the residual.
 
     Heading frame: the motion's CoM is relative to the mean of the sole points, `com_offset` [m]
-    forward of it; p_ref lies under it. `residual` (≥ 9,), in the order of `offsets.py`, adds
+    forward of it; p_ref lies under it. `residual` (≥ 9,), in the order of `TARGETS`, adds
     Δc_ref (x, y) and Δp_ref (x, y) [m], the CoM's height [m], a lean of the root, a rotation about
     the axes x and y [rad], and the angular momentum that the posture is to carry about x and y
     [N·m·s].

@@ -47,6 +47,8 @@ def check_qps(
             raise ConfigError(
                 f"must be {COMPILED_SOLVER!r}, not {qp.solver!r}", field=f"{name}.solver"
             )
+        if name != "qp" and qp.compensation is not None:
+            raise ConfigError("belongs to qp, and holds in steps too", field=f"{name}.compensation")
         if qp.solver_options:
             raise ConfigError("must be empty", field=f"{name}.solver_options")
         if qp.period != config.qp.period:
@@ -93,6 +95,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self.config = config or CaptureStepConfig()
         check_qps(self.config)
         super().__init__(robot, self.config.qp)
+        self.qp.observes_force = False  # its ticks do, also while it steps
         self.sets = ContactSets(robot, self.config.step_qp, self.config.torque_rate_limit)
         self.region = cop_region(robot, self.config.region_fraction)
         c = self.config
@@ -227,7 +230,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             return known.search
         return make_search(
             self.robot, s, self.region, self._step_limits or c.limits, c.foothold, self.feedback,
-            self.offsets.values, self.foothold_rule, self._arc,
+            self.offsets.values, self.foothold_rule, self._arc, self.qp.force_offset,
         )  # fmt: skip
 
     def block(self, state: RobotState, targets: Targets) -> Block:

@@ -6,6 +6,7 @@
 import numpy as np
 
 from poise.baselines.balance.references.targets import TRIGGER
+from poise.baselines.whole_body.compensation import watch
 from poise.baselines.whole_body.tick import ContactTick, go_on_from
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
@@ -63,7 +64,7 @@ def must_step(t: CaptureTick) -> bool:
             q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
         )
         return outside > g.restep_margin + t.offsets[TRIGGER]
-    x, y = s.capture_point[0], s.capture_point[1]
+    x, y = s.capture_point[0] + q.force_offset[0], s.capture_point[1] + q.force_offset[1]
     cos, sin = s.heading[0], s.heading[1]
     outside = distance_beyond(
         q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
@@ -200,6 +201,8 @@ def standing_tick(t: CaptureTick) -> None:
 def capture_tick(t: CaptureTick) -> None:
     """One tick of `CaptureStep`: `tau` then holds torques."""
     m = t.memory
+    if t.standing.compensation.active:
+        watch(t.standing.compensation)
     if not m.moved[0] and moves(t):
         m.moved[0] = 1
     if not m.swinging[0]:

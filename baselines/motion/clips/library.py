@@ -16,6 +16,12 @@ def packaged_clips() -> list[str]:
     return sorted(path.stem for path in packaged_folder("clips").glob("*.bvh"))
 
 
+def walking_clips() -> list[str]:
+    """Names of the packaged BVH files of walks, which a controller walked in the simulation, of the
+    same skeleton: for motion matching (`poise.training.motion.gaits.recorded_walk`)."""
+    return sorted(path.stem for path in (packaged_folder("clips") / "walks").glob("*.bvh"))
+
+
 def captured_clips() -> dict[str, Path]:
     """Name → file of captured clips: of folders in `POISE_CLIPS`, and of ``../shared/motions``."""
     named = [Path(each) for each in os.environ.get(PLACES, "").split(os.pathsep) if each]
@@ -27,7 +33,7 @@ def captured_clips() -> dict[str, Path]:
 
 def known_clips() -> list[str]:
     """Names of all clips that can be told by name, the packaged ones first."""
-    return list(dict.fromkeys([*packaged_clips(), *sorted(captured_clips())]))
+    return list(dict.fromkeys([*packaged_clips(), *walking_clips(), *sorted(captured_clips())]))
 
 
 def find_bvh(name: str | Path) -> Path:
@@ -38,6 +44,8 @@ def find_bvh(name: str | Path) -> Path:
     names = packaged_clips()
     if str(name) in names:
         return packaged_folder("clips") / f"{name}.bvh"
+    if str(name) in walking_clips():
+        return packaged_folder("clips") / "walks" / f"{name}.bvh"
     path = Path(name)
     if path.suffix.lower() == ".bvh" and is_file(path):
         return path

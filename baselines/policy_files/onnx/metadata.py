@@ -33,22 +33,27 @@ def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, object]
             fields[name] = numbers[0] if len(numbers) == 1 else numbers
     if "observation_names" in metadata:
         fields["observations"] = _terms(metadata, source)
+    if "anchor_body_name" in metadata:
+        fields["motion"] = {"anchor": metadata["anchor_body_name"], "clip": "network"}
     return fields
 
 
 def _entries(text: str, field: str, source: Path) -> list[object]:
     """The entries of a list, the only one where it is none."""
     if not text.lstrip().startswith("["):
-        return list(text.split(","))
+        return [each.strip() for each in text.split(",")]
     try:
-        return list(parse_json(text))
+        return list(parse_json(text.replace("'", '"')))  # as Python writes a list of names
     except ValueError as error:
         raise ConfigError(f"is no list in JSON: {error}", source=source, field=field) from None
 
 
 def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
-    names = metadata["observation_names"].split(",")
-    terms: list[dict[str, object]] = [{"term": RELATIVE.get(name, name)} for name in names]
+    names = list(map(str, _entries(metadata["observation_names"], "observation_names", source)))
+    # what tracks a motion is commanded that motion
+    tracking = "anchor_body_name" in metadata or any(map(_is_anchor, names))
+    renamed = {**RELATIVE, "command": "motion_command"} if tracking else RELATIVE
+    terms: list[dict[str, object]] = [{"term": renamed.get(name, name)} for name in names]
     for key, name in (("scale", "scale"), ("history_length", "history"), ("clip", "clip")):
         whole = f"observation_terms_{key}"
         if whole not in metadata:
@@ -66,6 +71,10 @@ def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
             else:
                 term[name] = values[0] if len(values) == 1 else values
     return terms
+
+
+def _is_anchor(name: str) -> bool:
+    return name.startswith(("motion_anchor", "motion_ref"))
 
 
 def _steps(values: tuple[float, ...], field: str, source: Path) -> int:

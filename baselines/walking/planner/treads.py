@@ -130,7 +130,7 @@ def rise_near(r: Treads, place: np.ndarray) -> float:
 @compiled
 def lean_ahead(t: WalkTick) -> None:
     """Turn the trunk that is asked for ahead, by what the rise of the edges near the stance sole
-    takes: a hip behind the CoM spares the knee of the leg ahead (docs/walking.md#stairs)."""
+    takes: a hip behind the CoM spares the knee of the leg ahead (docs/walking.md#terrain)."""
     c, r, own = t.walk, t.gait.treads, t.walk.reference_out
     foot = c.memory.foot[0]
     stance = c.state.sole_point[1 - foot if c.memory.swinging[0] else foot]

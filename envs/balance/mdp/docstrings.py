@@ -29,10 +29,12 @@ environment's generator. `reset(options=...)` takes
   heading frame; seconds), a list of them, [] for none; other units: `parse_pushes`
 - "noise": factor on the start noise, 0 for the exact standing posture
 - "qpos" (nq,), "qvel" (nv,): the start itself, MuJoCo's conventions
+- "fallen": number of a posture on the ground from which the robot has to get up
 
 End: `terminated` by a fall: CoM below `fall.height` of its standing height, root tilted by more
 than `fall.tilt`, anything but the feet on the ground (`fall.ground_contact`), or a simulation that
-diverged. `truncated` after `duration` seconds. `step` then needs a `reset`.
+diverged; with `fall.terminates` false by the last alone. `truncated` after `duration` seconds.
+`step` then needs a `reset`.
 
 Info: "reward_terms" (name → weighted value; their sum is the reward), "push" (a list: start, force
 [N], duration [s], body, direction [deg], impulse J [N·s], specific_impulse J/m [N·s/kg]),

@@ -178,6 +178,12 @@ def pace_kept(v: RewardView) -> float:
 
 
 @compiled
+def risen(v: RewardView) -> float:
+    height = v.state.com[2] / v.scales.height  # over level ground, whatever the feet do
+    return min(max(height, 0.0), 1.0) * 0.5 * (1.0 + uprightness(v.robot, v.state))
+
+
+@compiled
 def turn_kept(v: RewardView) -> float:
     return np.exp(-((v.velocity_error[2] / (0.1 * v.scales.omega)) ** 2))
 
@@ -250,6 +256,10 @@ class RewardWeights:
     pace: float = _term(
         0.0, pace_kept,
         "exp(−(|Δv| / 0.06 ω h)²), which still tells a walk that is far too slow to go faster"
+    )  # fmt: skip
+    rise: float = _term(
+        0.0, risen, "min(z/h, 1) (1 + cos φ)/2, z the CoM's height over the ground, also after a "
+        "fall", NO_DIVERGENCE,
     )  # fmt: skip
     turn_pace: float = _term(0.0, turn_kept, "exp(−(Δψ̇ / 0.1 ω)²), the same of the turning rate")
     power: float = _term(

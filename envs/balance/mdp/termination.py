@@ -20,6 +20,7 @@ class FallLimits:
         tilt: Tilt of the root beyond which it has fallen [deg]; a deep bow, the hip strategy at its
             end, is not yet a fall.
         ground_contact: Whether anything but the feet on the ground is a fall.
+        terminates: Whether a fall ends the episode; False: the robot may get up again.
         quiet_speed: Speed of the CoM below which the robot is quiet [m/s].
         quiet_tilt: Tilt of the root below which it is quiet [deg].
         quiet_time: Time for which it must be quiet at the end to have recovered [s].
@@ -30,6 +31,7 @@ class FallLimits:
     height: float = field(default=0.6, metadata={"above": 0.0, "max": 1.0})
     tilt: float = field(default=90.0, metadata={"above": 0.0, "max": 180.0})
     ground_contact: bool = True
+    terminates: bool = field(default=True, metadata={"omit": "default"})
     quiet_speed: float = field(default=0.1, metadata={"above": 0.0})
     quiet_tilt: float = field(default=30.0, metadata={"above": 0.0, "max": 90.0})
     quiet_time: float = field(default=1.0, metadata={"above": 0.0})
@@ -43,6 +45,7 @@ class Limits(Block):
     height: float  # [m]
     cos_tilt: float
     ground_contact: bool
+    terminates: bool
     quiet_speed: float  # [m/s]
     quiet_cos_tilt: float
     quiet_slide: float  # [m]
@@ -58,6 +61,7 @@ def episode_limits(
         height=limits.height * height_com,
         cos_tilt=float(np.cos(np.radians(limits.tilt))),
         ground_contact=limits.ground_contact,
+        terminates=limits.terminates,
         quiet_speed=limits.quiet_speed,
         quiet_cos_tilt=float(np.cos(np.radians(limits.quiet_tilt))),
         quiet_slide=limits.quiet_slide,

@@ -13,7 +13,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import real_array, whole_number
 from poise.envs.balance.action import BEYOND
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import FALLEN, EpisodeArrays
+from poise.envs.balance.episode import TERMINATED, EpisodeArrays
 from poise.envs.compiled.calls import CompiledStep
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
@@ -156,7 +156,7 @@ class EnvBatch(Copyable):
         record = self.episodes
         self.observations = record.observation.astype(np.float32)
         self.rewards = record.reward[:, 0].copy()
-        self.terminated = record.metrics[:, FALLEN] != 0.0
+        self.terminated = record.metrics[:, TERMINATED] != 0.0
         self.truncated = (record.running[:, 0] == 0) & ~self.terminated
 
     def _compiled_steps(self, played: Sequence[int]) -> StepSchedule | None:

@@ -17,11 +17,12 @@ SupportMargin = Callable[[float], float]  # direction [deg] → support margin �
 
 @dataclass(frozen=True)
 class _Magnitude:
-    """The four ways to say how large a push is; one of them is given."""
+    """The ways to say how large a push is; one of them is given."""
 
     impulse: float = field(default=0.0, metadata={"min": 0.0})
     force: float = field(default=0.0, metadata={"min": 0.0})
     specific_impulse: float = field(default=0.0, metadata={"min": 0.0})
+    specific_force: float = field(default=0.0, metadata={"min": 0.0})
     ankle_fraction: float = field(default=0.0, metadata={"min": 0.0})
 
 
@@ -53,13 +54,15 @@ def to_impulse(
     impulse           J [N·s]
     force             peak force F [N]: J = F T (square) or 2/π F T (half-sine)
     specific_impulse  J/m [N·s/kg]
+    specific_force    peak F/m [N/kg]
     ankle_fraction    J/m over `ankle_limit` in that direction, for that duration and profile
 
     Raises ConfigError for another unit, or when ankle_fraction has no `margin`.
     """
     if unit == "impulse":
         return value
-    if unit == "force":
+    if unit in ("force", "specific_force"):
+        value *= 1.0 if unit == "force" else robot.mass
         return value * duration * (1.0 if profile == "square" else 2.0 / np.pi)
     if unit == "specific_impulse":
         return value * robot.mass
@@ -77,9 +80,9 @@ def parse_pushes(
     """Pushes from one dictionary, one Push or Kick, or a list of them; [] means none.
 
     A push dictionary has the keys of `Push`, with exactly one magnitude among impulse [N·s],
-    force [N], specific_impulse [N·s/kg] and ankle_fraction; a dictionary with `delta_v` [m/s]
-    is a kick. Left out, body is the root body, start 0 s, duration 0.1 s, direction 0°.
-    `margin(direction)` gives δ(θ) [m] for ankle_fraction.
+    force [N], specific_impulse [N·s/kg], specific_force [N/kg] and ankle_fraction; a dictionary
+    with `delta_v` [m/s] is a kick. Left out, body is the root body, start 0 s, duration 0.1 s,
+    direction 0°. `margin(direction)` gives δ(θ) [m] for ankle_fraction.
 
     Raises ConfigError naming `source`, the field and the choices for an unknown key or body,
     a wrong type, a value out of range or not finite, and no or several magnitudes.

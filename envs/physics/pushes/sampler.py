@@ -1,7 +1,7 @@
 """Random pushes on a seeded schedule, described by data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,10 +14,18 @@ from .options import SupportMargin, check_body, to_impulse
 from .push import Kick, Push
 
 Range = tuple[float, float]
+OMIT = {"omit": "default"}  # from files: fields that came later
 Limits = Callable[[float], float]  # direction [deg] → J50 [N·s] of a 0.1 s square push
 Unit = Literal[
-    "impulse", "force", "specific_impulse", "ankle_fraction", "controller_fraction", "delta_v"
+    "impulse",
+    "force",
+    "specific_impulse",
+    "specific_force",
+    "ankle_fraction",
+    "controller_fraction",
+    "delta_v",
 ]
+PROFILES: tuple[Profile, ...] = ("square", "half-sine")
 LIMIT_DURATION = 0.1  # [s] of the pushes that a limit table was measured with
 
 
@@ -61,9 +69,9 @@ class PushSampler:
     """The distribution of random pushes; every range [lo, hi] is drawn from uniformly.
 
     `magnitude` has the unit named by `unit`:
-    impulse [N·s], force [N] (peak), specific_impulse [N·s/kg], delta_v [m/s] (velocity kicks),
-    ankle_fraction (of `ankle_limit`), controller_fraction (of the controller's own J50, which
-    grows with duration and profile as the ankle limit does).
+    impulse [N·s], force [N] (peak), specific_impulse [N·s/kg], specific_force [N/kg] (peak),
+    delta_v [m/s] (velocity kicks), ankle_fraction (of `ankle_limit`), controller_fraction (of the
+    controller's own J50, which grows with duration and profile as the ankle limit does).
 
     Attributes:
         magnitude: Range of the size of a push, in `unit`.
@@ -75,12 +83,17 @@ class PushSampler:
         elevation: Range of the angle of a push above the horizontal [deg].
         offset: Half side of the cube around the body's centre in which the point of a push is drawn
             [m].
-        profile: Force over time: constant (square), or as half a sine.
+        profile: Force over time: constant (square), as half a sine, or either (any).
         start: Range of when the first push begins, after the reset [s].
         count: Range of how many pushes there are in an episode.
         interval: Range of the time from the end of a push to the start of the next one [s].
         no_push: Probability of an episode without any push.
         limit_table: J50 by direction that `controller_fraction` is measured by.
+        spread: Largest angle of a push from the one direction that an episode draws for all its
+            pushes; None: each push draws its own [deg].
+        either_side: Draw, for an episode, whether its directions are mirrored to the other side.
+        others: Further distributions: an episode has the pushes of one of them or of this one, all
+            equally likely.
         kicks: Probability that a kick of the root takes the place of a push.
         kick_speed: Range of the size of such a kick [m/s].
     """
@@ -92,12 +105,15 @@ class PushSampler:
     direction: Range = field(default=(0.0, 360.0), metadata={"min": -360.0, "max": 360.0})
     elevation: Range = field(default=(0.0, 0.0), metadata={"min": -90.0, "max": 90.0})
     offset: float = field(default=0.0, metadata={"min": 0.0})
-    profile: Profile = "square"
+    profile: Profile | Literal["any"] = "square"
     start: Range = field(default=(0.5, 0.5), metadata={"min": 0.0})
     count: tuple[int, int] = field(default=(1, 1), metadata={"min": 1, "max": 1000})
     interval: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})
     no_push: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
     limit_table: LimitTable | None = None
+    spread: float | None = field(default=None, metadata={"min": 0.0, "max": 180.0, **OMIT})
+    either_side: bool = field(default=False, metadata=OMIT)
+    others: "tuple[PushSampler, ...]" = field(default=(), metadata=OMIT)
     kicks: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, "omit": "default"})
     kick_speed: Range = field(default=(0.5, 1.0), metadata={"min": 0.0, "omit": "default"})
 
@@ -125,14 +141,20 @@ class PushSampler:
 
         Raises ConfigError for a body that the robot lacks, or a missing margin or limit.
         """
+        if self.others:
+            chosen = int(rng.integers(len(self.others) + 1))
+            one = replace(self, others=()) if chosen == 0 else self.others[chosen - 1]
+            return one.sample(rng, robot, margin, limits)
         for body in self.bodies:
             check_body(body, robot, "bodies")
         quiet = rng.random() < self.no_push
         count = int(rng.integers(self.count[0], self.count[1], endpoint=True))
         pushes = []
         start = rng.uniform(*self.start)
+        side = None if self.spread is None else rng.uniform(*self.direction)
+        sign = rng.choice((-1.0, 1.0)) if self.either_side else 1.0
         for _ in range(count):
-            push = self._draw(rng, robot, start, margin, limits or self.limit_table)
+            push = self._draw(rng, robot, start, side, sign, margin, limits or self.limit_table)
             pushes.append(push)
             end = start if isinstance(push, Kick) else start + push.duration
             start = end + rng.uniform(*self.interval)
@@ -143,16 +165,23 @@ class PushSampler:
         rng: np.random.Generator,
         robot: Robot,
         start: float,
+        side: float | None,
+        sign: float,
         margin: SupportMargin | None,
         limits: Limits | None,
     ) -> Push | Kick:
         bodies = self.bodies or push_bodies(robot)
         body = bodies[int(rng.integers(len(bodies)))]
         duration = rng.uniform(*self.duration)
-        direction = rng.uniform(*self.direction)
+        if side is None or self.spread is None:
+            direction = rng.uniform(*self.direction)
+        else:
+            direction = (side + rng.uniform(-self.spread, self.spread)) % 360.0
+        direction *= sign
         elevation = rng.uniform(*self.elevation)
         x, y, z = (float(u) for u in self.offset * rng.uniform(-1.0, 1.0, 3))
         value = rng.uniform(*self.magnitude)
+        profile = PROFILES[int(rng.integers(2))] if self.profile == "any" else self.profile
         if self.kicks > 0.0 and rng.random() < self.kicks:
             return Kick(start, rng.uniform(*self.kick_speed), direction)
         if self.unit == "delta_v":
@@ -163,8 +192,8 @@ class PushSampler:
                     "needs the controller's limits, unknown here", field="limit_table"
                 )
             omega = robot.omega
-            longer = duration_factor(omega, duration, self.profile)
+            longer = duration_factor(omega, duration, profile)
             impulse = value * limits(direction) * longer / duration_factor(omega, LIMIT_DURATION)
         else:
-            impulse = to_impulse(self.unit, value, robot, direction, duration, self.profile, margin)
-        return Push(body, start, duration, impulse, direction, elevation, (x, y, z), self.profile)
+            impulse = to_impulse(self.unit, value, robot, direction, duration, profile, margin)
+        return Push(body, start, duration, impulse, direction, elevation, (x, y, z), profile)

@@ -428,3 +428,28 @@ def test_a_policy_sees_the_phase_of_the_motion() -> None:
         observation, *_ = slow.step(zero(slow))
     assert observation[-1] == pytest.approx(1.0 - slow.motion_time / slow.motion.duration, abs=1e-5)
     assert slow.motion_time < 0.4
+
+
+def test_the_estimated_force_is_observed_along_the_heading():
+    """`push_force` and `push_mean` are what the controller's own estimate finds, in their units."""
+    config = {"base": "momentum-qp", "compensation": {"gain": 0.0, "reach": 0.0}}
+    extra = {"observation": {"extra": ["push_force", "push_mean"], "privileged": ["push"]}}
+    env = ResidualBalanceEnv(robot(), extra, controller=config, pushes=None, duration=4.0)
+    push = {"body": "torso", "force": 12.0, "duration": 4.0, "direction": 90.0, "start": 0.2}
+    env.reset(seed=0, options={"push": push})
+    sizes = {term.name: term.size for term in env.terms}
+    assert (sizes["push_force"], sizes["push_mean"], sizes["true_push"]) == (2, 2, 3)
+    ends = dict(zip(sizes, np.cumsum(list(sizes.values())), strict=True))
+    for _ in range(120):
+        env.step(zero(env))
+    seen = env.episode.observation
+    own = env.controller.compensation(env.state_source.state, env.targets).push
+    cos, sin = env.simulation.state.heading
+    weight = env.scales.weight
+    for name, value, unit in (("push_force", own.force, 0.1), ("push_mean", own.mean, 0.02)):
+        expected = np.array([cos * value[0] + sin * value[1], cos * value[1] - sin * value[0]])
+        entries = seen[ends[name] - 2 : ends[name]]
+        np.testing.assert_allclose(entries, expected / (unit * weight), rtol=0.02, atol=1e-3)
+    assert seen[ends["push_force"] - 1] > 0.2  # to the left
+    env.reset(seed=0, options={"push": []})
+    assert not env.episode.observation[ends["push_mean"] - 2 : ends["push_mean"]].any()

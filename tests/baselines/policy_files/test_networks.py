@@ -13,7 +13,8 @@ import torch
 
 import poise
 from poise.baselines.policy_files.config import Memory, ObservationTerm, PolicyFileConfig
-from poise.baselines.policy_files.networks import load_network, script_sizes
+from poise.baselines.policy_files.networks import load_network
+from poise.baselines.policy_files.script_sizes import script_sizes
 from poise.configs.errors import ConfigError, PoiseError
 from tests.support.policies import helper, write_graph, write_recurrent
 
@@ -150,3 +151,55 @@ def test_torchscript_with_memory(tmp_path: Path) -> None:
     assert network.act(SEEN)["action"][0] == 10.0
     with pytest.raises(ConfigError, match=r"memory\[0\].shape: needs a shape"):
         load_network(path, PolicyFileConfig(memory=(Memory("h", 2),)))
+
+
+class Recurrent(torch.nn.Module):
+    """A policy as rsl_rl exports one: layers by a name before that of the LSTM that they follow."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.actor = torch.nn.Sequential(torch.nn.Linear(64, 32), torch.nn.ELU(),
+                                         torch.nn.Linear(32, 7))  # fmt: skip
+        self.rnn = torch.nn.LSTM(11, 64)
+        self.register_buffer("hidden_state", torch.zeros(1, 1, 64))
+
+
+class Keeps(Recurrent):
+    def forward(self, o: torch.Tensor) -> torch.Tensor:
+        out, (h, _) = self.rnn(o.unsqueeze(0), (self.hidden_state, self.hidden_state))
+        self.hidden_state[:] = h
+        return self.actor(out.squeeze(0))
+
+
+class Given(Recurrent):
+    def forward(
+        self, o: torch.Tensor, h: torch.Tensor, c: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        out, (h, c) = self.rnn(o.unsqueeze(0), (h, c))
+        return self.actor(out.squeeze(0)), h, c
+
+
+@pytest.mark.parametrize("kind", [Keeps, Given])
+def test_the_sizes_of_a_recurrent_script(tmp_path: Path, kind: type[Recurrent]) -> None:
+    """Those of its observation and action, not of whichever matrix is first and last."""
+    path = tmp_path / "policy.pt"
+    torch.jit.save(torch.jit.script(kind()), str(path))
+    assert script_sizes(path) == (11, 7)
+
+
+def test_the_sizes_of_a_normalised_script(tmp_path: Path) -> None:
+    """A single number that goes with any mean is no observation."""
+
+    class Normalised(torch.nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.register_buffer("count", torch.ones(1))
+            self.register_buffer("mean", torch.zeros(5))
+            self.layer = torch.nn.Linear(5, 3)
+
+        def forward(self, o: torch.Tensor) -> torch.Tensor:
+            return self.layer((o - self.mean) / self.count)
+
+    path = tmp_path / "policy.pt"
+    torch.jit.save(torch.jit.script(Normalised()), str(path))
+    assert script_sizes(path) == (5, 3)

@@ -12,7 +12,8 @@ from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfi
 from poise.baselines.policy_files.observations import Observer
 from poise.baselines.policy_files.terms import ALIASES, Seen
 from poise.configs.errors import ConfigError
-from tests.support.shared import generic_state
+from poise.envs.physics.simulation import Simulation
+from tests.support.shared import generic_state, robot
 
 JOINTS = ["left_hip", "left_knee", "right_hip"]
 
@@ -45,12 +46,23 @@ def test_terms_mean_what_others_call_so() -> None:
     state = seen().state
     w, x, y, z = state.qpos[3:7]
     turn = Rotation.from_quat([x, y, z, w]).inv()
+    _, pitch, roll = turn.inv().as_euler("ZYX")
+    upright = Rotation.from_euler("ZYX", [0.0, pitch, roll])
     expected = {
         "base_lin_vel": turn.apply(np.array(state.qvel[:3])),
         "base_ang_vel": state.qvel[3:6],
         "projected_gravity": turn.apply([0.0, 0.0, -1.0]),
         "roll_pitch": turn.inv().as_euler("ZYX")[:0:-1],
+        "root_quat": state.qpos[3:7],
+        "root_rot_6d": turn.inv().as_matrix()[:, :2].ravel(),
+        "root_local_rot_6d": upright.as_matrix()[:, :2].ravel(),
+        "root_local_rot_tan_norm": [
+            *upright.apply([1.0, 0.0, 0.0]),
+            *upright.apply([0.0, 0.0, 1.0]),
+        ],
         "velocity_commands": [1.0, 2.0, 3.0],
+        "command_lin_vel": [1.0, 2.0],
+        "command_ang_vel": [3.0],
         "joint_pos": state.q[:3],
         "joint_pos_rel": state.q[:3] - [0.1, 0.2, 0.3],
         "joint_vel": state.qvel[6:9],
@@ -63,6 +75,29 @@ def test_terms_mean_what_others_call_so() -> None:
         np.testing.assert_allclose(observed(name), value, atol=1e-6, err_msg=name)
     for alias, name in ALIASES.items():
         np.testing.assert_array_equal(observed(alias), observed(name))
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("roll_pitch", lambda whole, upright: [-0.3, 0.4]),
+        ("root_quat", lambda whole, upright: whole.as_quat()[[3, 0, 1, 2]]),
+        ("root_rot_6d", lambda whole, upright: whole.as_matrix()[:, :2].ravel()),
+        ("root_local_rot_6d", lambda whole, upright: upright.as_matrix()[:, :2].ravel()),
+        (
+            "root_local_rot_tan_norm",
+            lambda whole, upright: upright.as_matrix()[:, [0, 2]].T.ravel(),
+        ),
+    ],
+)
+def test_the_attitude_of_a_body_that_leans(name: str, expected: Any) -> None:
+    """Far from upright and turned: the heading counts in some terms, in others it does not."""
+    whole = Rotation.from_euler("ZYX", [0.7, 0.4, -0.3])
+    qpos = robot().standing_qpos.copy()
+    qpos[3:7] = whole.as_quat()[[3, 0, 1, 2]]
+    state = Simulation(robot()).reset(qpos, np.zeros(robot().model.nv))
+    value = expected(whole, Rotation.from_euler("ZYX", [0.0, 0.4, -0.3]))
+    np.testing.assert_allclose(shown(ObservationTerm(name), state=state), value, atol=1e-9)
 
 
 def test_scale_comes_after_clip() -> None:
@@ -79,6 +114,9 @@ def test_scale_comes_after_clip() -> None:
         ({"term": "joint_pos_rel", "joints": ("*_hip",), "scale": 0.0}, [0.0, 0.0]),
         ({"term": "last_action", "joints": ("right_hip",)}, [-0.5]),
         ({"term": "last_action", "scale": {"*_knee": 0.0, "*": 3.0}}, [0.0, -1.5]),
+        ({"term": "root_quat", "pick": (1, 2, 3, 0), "scale": 0.0}, [0.0] * 4),
+        ({"term": "command", "scale": {"lin_vel_x": 2.0, "ang_vel_yaw": 0.5}}, [2.0, 2.0, 1.5]),
+        ({"term": "command", "scale": {"left": 3.0}, "pick": (2, 1)}, [3.0, 6.0]),
         ({"term": "velocity_commands", "at_rest": (7.0, 8.0, 9.0)}, [1.0, 2.0, 3.0]),
     ],
 )

@@ -12,9 +12,10 @@ import torch
 
 import poise
 from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
+from poise.baselines.policy_files.motion.config import MotionConfig
 from poise.baselines.registry import controller_config, load_controller
 from poise.configs.errors import ConfigError
-from tests.support.policies import gym_config, lab_deploy, linear, write_onnx, write_yaml
+from tests.support.policies import gym_config, lab_deploy, linear, within, write_onnx, write_yaml
 from tests.support.shared import robot
 
 N = 7
@@ -132,6 +133,37 @@ def test_holosomas_metadata_are_lists_in_json(tmp_path: Path) -> None:
     config = read(path)
     assert config.joints == ("left_knee", "right_knee") and config.action_scale == 0.25
     assert config.stiffness == (40.5, 41.5) and config.damping == (2.0, 3.0)
+
+
+@pytest.mark.parametrize("names", ["left_knee, right_knee", "['left_knee', 'right_knee']"])
+def test_metadata_in_other_forms(tmp_path: Path, names: str) -> None:
+    """Blanks behind commas, and lists as Python writes them."""
+    metadata = {"joint_names": names, "observation_names": "base_ang_vel, actions"}
+    write_onnx(tmp_path / "policy.onnx", linear(5, 2), metadata)
+    config = read(tmp_path / "policy.onnx")
+    assert config.joints == ("left_knee", "right_knee")
+    assert config.observations == (ObservationTerm("base_ang_vel"), ObservationTerm("actions"))
+
+
+def test_what_a_tracker_is_commanded_is_its_motion(tmp_path: Path) -> None:
+    """As BeyondMimic and mjlab export it: the clip is within, what is said beside it is merged."""
+    metadata = {"joint_names": "left_knee,right_knee", "anchor_body_name": "torso",
+                "observation_names": "command,motion_anchor_ori_b,actions"}  # fmt: skip
+    rows = {"joint_pos": (3, 2), "joint_vel": (3, 2), "body_pos_w": (3, 1, 3),
+            "body_quat_w": (3, 1, 4)}  # fmt: skip
+    within(tmp_path / "p.onnx", 12, metadata, **{n: np.zeros(shape) for n, shape in rows.items()})
+    config = read(tmp_path / "p.onnx")
+    assert config.motion == MotionConfig(clip="network", anchor="torso")
+    assert config.inputs == {
+        "obs": (ObservationTerm("motion_command"), ObservationTerm("motion_anchor_ori_b"),
+                ObservationTerm("actions")),
+        "time_step": (ObservationTerm("time_step"),),
+    }  # fmt: skip
+    (tmp_path / "own.csv").write_text("")
+    own = write_yaml(tmp_path / "own.yaml", kind="policy-file", policy="p.onnx",
+                     motion={"clip": "own.csv", "plays": True})  # fmt: skip
+    expected = MotionConfig(clip=str(tmp_path / "own.csv"), anchor="torso", plays=True)
+    assert read(own).motion == expected
 
 
 def test_a_slice_of_everything_is_read_as_all(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.files import packaged, resolve
@@ -55,6 +56,7 @@ class Now(NamedTuple):
     v: np.ndarray
     action: np.ndarray  # of the step before
     step: int
+    turn: Rotation  # of the root
 
 
 class Loop(NamedTuple):
@@ -277,6 +279,39 @@ def unitree_mjlab() -> Loop:
     return Loop(G1, default, kp, kd, scale, observe)
 
 
+def unitree_mjlab_2026() -> Loop:
+    """The same with a clock, which shows zeros at zero command; the waist yaws further."""
+    plain = unitree_mjlab()
+    scale = [*plain.scale[:12], 0.55, *plain.scale[13:]]
+
+    def observe(n: Now) -> np.ndarray:
+        return frame(n.gyro, n.gravity, [0, 0, 0], [0, 0], n.q - plain.default, n.v, n.action)
+
+    return plain._replace(scale=scale, observe=observe)
+
+
+def amp_getup() -> Loop:
+    """Four whole steps, oldest first, the first one before it; it sees its action within ±10."""
+    hip, knee, ankle, arm, wrist = 40.179, 99.098, 28.501, 14.251, 8.611
+    kp = [knee, knee, hip, knee, ankle, ankle] * 2 + [hip, ankle, ankle] + (
+        [arm] * 5 + [wrist] * 2) * 2  # fmt: skip
+    hip, knee, ankle, arm, wrist = 2.5579, 6.3088, 1.8144, 0.9072, 0.5482
+    kd = [knee, knee, hip, knee, ankle, ankle] * 2 + [hip, ankle, ankle] + (
+        [arm] * 5 + [wrist] * 2) * 2  # fmt: skip
+    hip, knee, ankle, wrist = 0.54755, 0.35066, 0.43858, 0.29033
+    scale = [knee, knee, hip, knee, ankle, ankle] * 2 + [hip, ankle, ankle] + (
+        [ankle] * 5 + [wrist] * 2) * 2  # fmt: skip
+    past: list[np.ndarray] = []
+
+    def observe(n: Now) -> np.ndarray:
+        past.append(
+            frame(n.gyro, n.gravity, [0, 0, 0], n.q - BENT, n.v, np.clip(n.action, -10, 10))
+        )
+        return frame(*(past[max(0, len(past) - 4 + i)] for i in range(4)))
+
+    return Loop(G1, BENT, kp, kd, scale, observe, bound=10.0)
+
+
 def unitree_lab() -> Loop:
     """Isaac Lab's order of joints, five steps of each term, oldest first, filled by the first."""
     order = [G1[i] for i in (0, 6, 12, 1, 7, 13, 2, 8, 14, 3, 9, 15, 22, 4, 10, 16, 23, 5, 11, 17,
@@ -315,21 +350,93 @@ def booster_deploy_law() -> Loop:
                           scale=plain.scale * factor["action"], adds=adds)  # fmt: skip
 
 
+def unitree_dance() -> Loop:
+    """A tracker; what it follows stands in the default posture, and faces as the robot does."""
+    plain = unitree_mjlab()
+    faces: list[Rotation] = []
+
+    def observe(n: Now) -> np.ndarray:
+        torso = torso_of(n)
+        faces.extend([] if faces else [Rotation.from_euler("z", torso.as_euler("ZYX")[0])])
+        ori = (torso.inv() * faces[0]).as_matrix()
+        return frame(plain.default, np.zeros(29), ori[:, :2].ravel(), n.gyro, n.q - plain.default,
+                     n.v, n.action)  # fmt: skip
+
+    return plain._replace(observe=observe)
+
+
+def torso_of(n: Now) -> Rotation:
+    """The torso above the waist's yaw, roll and pitch."""
+    return n.turn * Rotation.from_euler("ZXY", n.q[12:15])
+
+
+def holosoma_dance() -> Loop:
+    """Its clip's first frame, which is within the network, is held at rest."""
+    plain = holosoma()
+    session = onnx_session(network("holosoma-dance-g1"))
+    given = {"obs": np.zeros((1, 154), np.float32), "time_step": np.zeros((1, 1), np.float32)}
+    q, quat = (each[0] for each in session.run(["joint_pos", "ref_quat_xyzw"], given))
+    own = Rotation.from_quat(quat)
+    faces: list[Rotation] = []
+
+    def observe(n: Now) -> np.ndarray:
+        torso = torso_of(n)
+        turn = torso.as_euler("ZYX")[0] - own.as_euler("ZYX")[0]
+        faces.extend([] if faces else [Rotation.from_euler("z", turn) * own])
+        ori = (torso.inv() * faces[0]).as_matrix()
+        return frame(np.clip(n.action, -100, 100), n.gyro, n.q - BENT, n.v, q, np.zeros(29),
+                     ori[:, :2].ravel())  # fmt: skip
+
+    return plain._replace(observe=observe, scale=1.0, bound=100.0)
+
+
+def twist2_tracker() -> Loop:
+    """Its default posture at rest, on soles as high as standing."""
+    plain = twist2()
+    robot = shared_robot("unitree_g1")
+    data, low = mujoco.MjData(robot.model), []
+    places = [robot.model.joint(name).qposadr[0] for name in plain.joints]
+    for posture in (robot.standing_qpos[places], plain.default):
+        data.qpos[:] = robot.standing_qpos
+        data.qpos[places] = posture
+        mujoco.mj_forward(robot.model, data)
+        low.append(min(data.xpos[sole.body_id] [2] + (data.xmat[sole.body_id].reshape(3, 3)
+                       @ sole.position)[2] for sole in robot.soles))  # fmt: skip
+    height = robot.standing_qpos[2] + low[0] - low[1]
+    reference = frame([0, 0], height, [0, 0], 0, plain.default)
+    past = deque([np.zeros(127)] * 10, maxlen=10)
+
+    def observe(n: Now) -> np.ndarray:
+        v = n.v.copy()
+        v[[4, 5, 10, 11]] = 0.0
+        now = frame(reference, 0.25 * n.gyro, n.roll_pitch, n.q - plain.default, 0.05 * v, n.action)
+        seen = frame(now, *past, reference)
+        past.append(now)
+        return seen
+
+    return plain._replace(observe=observe)
+
+
 LOOPS: dict[str, Callable[[], Loop]] = {
+    "amp-getup-g1": amp_getup,
     "asap-loco-g1": asap,
     "booster-deploy-t1": booster_deploy,
     "booster-deploy-t1-law": booster_deploy_law,
     "booster-gym-t1": booster_gym,
     "falcon-g1": falcon,
     "falcon-loco-g1": falcon_loco,
+    "holosoma-dance-g1": holosoma_dance,
     "holosoma-fastsac-g1": holosoma,
     "holosoma-ppo-g1": holosoma,
     "launcher-stance-g1": launcher,
     "playground-g1": playground_g1,
     "playground-t1": playground_t1,
     "twist2-g1": twist2,
+    "twist2-tracker-g1": twist2_tracker,
+    "unitree-dance-g1": unitree_dance,
     "unitree-g1-velocity": unitree_mjlab,
     "unitree-lab-g1": unitree_lab,
+    "unitree-mjlab-2026-03": unitree_mjlab_2026,
 }
 
 
@@ -345,8 +452,9 @@ def asked(path: Path) -> Callable[[np.ndarray], np.ndarray]:
         module = torch.jit.load(str(path)).eval()
         return lambda seen: module(torch.from_numpy(seen[None])).detach().numpy()[0]
     session = onnx_session(path)
-    name = session.get_inputs()[0].name
-    return lambda seen: session.run(None, {name: seen[None]})[0][0]
+    name, *others = [each.name for each in session.get_inputs()]
+    more = {each: np.zeros((1, 1), np.float32) for each in others}  # a clip's step: no action of it
+    return lambda seen: session.run(None, {name: seen[None], **more})[0][0]
 
 
 def played_apart(loop: Loop, path: Path, robot: Robot, data: Any) -> Iterator[np.ndarray]:
@@ -366,7 +474,7 @@ def played_apart(loop: Loop, path: Path, robot: Robot, data: Any) -> Iterator[np
         R = axes.reshape(3, 3)
         roll_pitch = np.array([np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])])
         now = Now(data.qvel[3:6], -R[2], R.T @ data.qvel[:3], roll_pitch, data.qpos[places],
-                  data.qvel[dofs], action, step)  # fmt: skip
+                  data.qvel[dofs], action, step, Rotation.from_matrix(R))  # fmt: skip
         action = np.asarray(ask(loop.observe(now).astype(np.float32)), dtype=float)
         yield action
         bounded = np.clip(action, -loop.bound, loop.bound)

@@ -103,9 +103,9 @@ def test_a_relative_folder_is_refused(room: Path, monkeypatch, caches: str) -> N
 
 
 def test_without_a_cache_one_line_says_so(tmp_path: Path) -> None:
-    """Once, when something compiles; and it compiles."""
+    """When something compiles; and it compiles."""
     code = (
-        "from poise.envs.compiled import jit; jit.patience.tell(); jit.patience.tell(); "
+        "from poise.envs.compiled import jit; jit.patience.tell('a pendulum'); "
         "from poise.envs.compiled.maths.pendulum import compiled_rate; "
         "print(compiled_rate(9.81, 1.0))"
     )
@@ -113,8 +113,8 @@ def test_without_a_cache_one_line_says_so(tmp_path: Path) -> None:
         [sys.executable, "-c", code], env=os.environ | {"NUMBA_CACHE_DIR": "here"}, cwd=tmp_path,
         capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert done.stderr == ("poise: compiling, in every process anew, for no kernels are kept: "
-                           "here/poise: is no absolute path\n")  # fmt: skip
+    why = "no kernels are kept: here/poise: is no absolute path"
+    assert done.stderr == f"poise: compiling a pendulum, in every process again: {why}\n"
     assert float(done.stdout) > 3.0 and not list(tmp_path.iterdir())
 
 

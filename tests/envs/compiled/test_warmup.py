@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 from pathlib import Path
 from types import ModuleType
@@ -9,6 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from poise.baselines.warmup import FURTHER, NAMES, PARTS
 from poise.envs.compiled import jit, warmup
 from poise.envs.compiled.maths import pendulum
 from poise.envs.compiled.maths.pendulum import compiled_rate
@@ -34,15 +36,14 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     monkeypatch.setattr(jit, "CACHE", tmp_path)
     monkeypatch.setattr(warmup, "_compile_apart", compile_apart)
     monkeypatch.setattr(warmup, "_tried", set())
-    monkeypatch.setattr(jit.patience, "tell", lambda: None)
     return found
 
 
 def test_a_part_is_compiled_once_for_its_sources(asked, monkeypatch) -> None:
     """Then again when the digest of a file has changed whose kernels it has; others are not."""
-    warmup.fill_cache(MODULE, ("solver", "steps"))
+    warmup.fill_cache(MODULE, NAMES, ("solver", "steps"))
     monkeypatch.setattr(warmup, "_tried", set())
-    warmup.fill_cache(MODULE, ("solver", "steps"))
+    warmup.fill_cache(MODULE, NAMES, ("solver", "steps"))
     assert asked == [["solver", "steps"]]
     files = [
         line.split(" ", 1)[1] for line in warmup._record(MODULE, "steps").read_text().split("\n")
@@ -51,8 +52,29 @@ def test_a_part_is_compiled_once_for_its_sources(asked, monkeypatch) -> None:
     (first, *_), before = files, warmup.source_digest
     monkeypatch.setattr(warmup, "source_digest", lambda f: "" if f == first else before(f))
     warmup._record(MODULE, "solver").write_text(f"{before(files[1])} {files[1]}")
-    warmup.fill_cache(MODULE, ("solver", "steps"))
+    warmup.fill_cache(MODULE, NAMES, ("solver", "steps"))
     assert asked[1:] == [["steps"]]
+
+
+def test_a_line_says_what_is_compiled(asked, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of every group what is missing, and nothing of what is there."""
+    warmup.fill_cache(MODULE, NAMES, ("steps",))
+    warmup.fill_cache(MODULE, NAMES, ("steps", "solver"), ("walking", "planner"))
+    lines = capsys.readouterr().err.splitlines()
+    end = "for the first use: up to a minute, once"
+    assert lines == [
+        f"poise: compiling physics {end}",
+        f"poise: compiling the QP solver {end}",
+        f"poise: compiling walking, planned steps {end}",
+    ]
+
+
+def test_every_part_is_named_and_compiled_by_setup() -> None:
+    """Those that the module has."""
+    module = importlib.import_module(MODULE)
+    own = {name for name, value in vars(module).items() if callable(value)
+           and getattr(value, "__module__", "") == MODULE and not name.startswith("_")}  # fmt: skip
+    assert own == {*PARTS, *FURTHER} == {*NAMES}
 
 
 @pytest.mark.parametrize("record", ["", "abc /nowhere.py", "garbage", None])
@@ -60,7 +82,7 @@ def test_a_record_that_says_nothing_counts_for_nothing(asked, record: str | None
     """Empty, of a file that is gone, of no file, or missing."""
     if record is not None:
         warmup._record(MODULE, "solver").write_text(record)
-    warmup.fill_cache(MODULE, ("solver",))
+    warmup.fill_cache(MODULE, NAMES, ("solver",))
     assert asked == [["solver"]]
 
 

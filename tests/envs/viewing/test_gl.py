@@ -92,3 +92,33 @@ def test_other_libraries_do_not_see_osmesa():
     environment = {**os.environ, "MUJOCO_GL": "osmesa"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
+
+
+HIDDEN = """
+import ctypes, ctypes.util
+find, init = ctypes.util.find_library, ctypes.CDLL.__init__
+ctypes.util.find_library = lambda name: None if "OSMesa" in name else find(name)
+def loaded(self, name, *args, **kwargs):
+    if name and "OSMesa" in str(name):
+        raise OSError(f"{name}: cannot open shared object file")
+    init(self, name, *args, **kwargs)
+ctypes.CDLL.__init__ = loaded
+"""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["replay", ".", "--trial", "0", "--video", "a.mp4"], ["robot", "compact"]],
+)
+def test_software_that_is_asked_for_and_missing_is_one_line(tmp_path, command):
+    """With the package's name, and no traceback, whatever draws or does not."""
+    pytest.importorskip("OpenGL")
+    (tmp_path / "sitecustomize.py").write_text(HIDDEN)
+    (tmp_path / "summary.json").write_text("{}")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-m", "poise.training.cli", *command], capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": path, "MUJOCO_GL": "osmesa"}, cwd=tmp_path,
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr and done.returncode != 0
+    assert "libosmesa6" in done.stderr and len(done.stderr.strip().splitlines()) == 1, done.stderr

@@ -404,6 +404,7 @@ def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None
     assert main(["list"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "residual-torque humanoid 38.1 targets, steps feedback-step the default" in shown
+    assert "as on the leaderboards; suite standard on humanoid, " in shown
 
 
 def test_j50_of_the_list_is_that_of_the_leaderboards() -> None:
@@ -411,12 +412,15 @@ def test_j50_of_the_list_is_that_of_the_leaderboards() -> None:
     docs = Path(__file__).parents[3] / "docs"
     if not docs.is_dir():
         pytest.skip("not a checkout")
-    scores = json.loads((packaged_folder(".") / FIGURES).read_text())["j50"]
+    known = json.loads((packaged_folder(".") / FIGURES).read_text())
+    scores, suites = known["j50"], known["suites"]
+    assert scores.keys() == suites.keys()
     for page in docs.glob("leaderboard*.md"):
         measured: dict[str, float] = {}
         for source in re.findall(r"docs/results/\S+?\.json", page.read_text().splitlines()[2]):
             result = json.loads((docs.parent / source).read_text())
             measured |= {name: own["j50_mean"] for name, own in result["controllers"].items()}
+            assert suites[result["robot"]["name"]] == result["suite"]
         assert measured
         for name, told in scores[result["robot"]["name"]].items():
             if name in measured:

@@ -86,7 +86,7 @@ def test_what_comes_next_fits_the_run() -> None:
 def test_the_progress_line_tells_the_exploring_policy_from_the_held_out_rate(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    progress = Progress(100)
+    progress = Progress(tiny_config(steps=100))
     progress.num_timesteps = 50
     progress.locals = {"infos": [{"is_success": True}, {"is_success": False}, {}]}
     progress._on_training_start()

@@ -27,11 +27,13 @@ from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning import callbacks, curriculum
+from poise.training.learning.callbacks import Progress
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.policy_files import FILES, KEPT, POLICY, STATE
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import _env_seed, train
+from poise.training.running.terminal import ProgressLines
 from tests.support.shared import finished_run, robot, tiny_config
 
 ROOT = Path(__file__).parents[3]
@@ -373,11 +375,29 @@ def test_the_curriculum_grows_the_errors_of_the_robot(given, parts, tmp_path, mo
     np.testing.assert_allclose(noises[:4], expected)
 
 
-def test_the_progress_bar_shows_steps_and_success(tmp_path, capsys):
-    """With a bar, the recovery rate of the exploring policy is printed."""
-    train(tiny_config(steps=128), tmp_path, progress=True)
-    out = capsys.readouterr().out
-    assert "128/128 steps" in out and "recovered" in out
+def test_the_progress_shows_steps_and_success_and_says_when_it_evaluates(tmp_path, monkeypatch):
+    """At the start, where the first line is printed, and at the end; rollouts are whole."""
+    said = []
+    update = Progress.say
+    monkeypatch.setattr(Progress, "say", lambda bar, text: (said.append(text), update(bar, text)))
+    seen = []
+    monkeypatch.setattr(ProgressLines, "update", lambda bar, task, **changes: seen.append(changes))
+    train(tiny_config(steps=100), tmp_path, progress=True)
+    trials = tiny_config().evaluation.trials
+    assert seen[0] == {"rate": f"evaluating: 0/{trials} pushes"}
+    assert said[0] == said[-2] == seen[0]["rate"] and said[1] == said[-1] == ""
+    last = [each for each in seen if "completed" in each][-1]
+    assert last["completed"] == 128 and last["rate"].endswith("/s")
+
+
+def test_the_progress_ends_where_the_last_rollout_does(capsys):
+    """Not at the steps that were asked for."""
+    bar = Progress(tiny_config(steps=100))
+    bar.num_timesteps, bar.locals = 0, {}
+    bar._on_training_start()
+    bar.say("evaluating")
+    bar.close()
+    assert "0/128" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,11 @@ import pytest
 from rich.console import Console
 
 from poise.training.running import terminal
-from poise.training.running.terminal import progress_bar
+from poise.training.running.terminal import progress_bar, steps_bar
 
 
 def test_progress_is_lines_where_no_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One every ten seconds at first, then every tenth of the time that has passed."""
+    """At once, every ten seconds at first, then every tenth of the time that has passed."""
     clock = [0.0]
     monkeypatch.setattr(terminal.time, "monotonic", lambda: clock[0])
     text = io.StringIO()
@@ -24,8 +24,21 @@ def test_progress_is_lines_where_no_terminal_shows_a_bar(monkeypatch: pytest.Mon
         *lines, _ = text.getvalue().splitlines() + [""]
     counts = [int(line.split("/")[0].split()[-1]) for line in lines]
     assert all("recovered: a 50%" in line and "━" not in line for line in lines)
-    assert counts[:10] == list(range(10, 110, 10))
-    assert counts[10:] == [110, 121, 134, 148, 163, 180, 198, 218, 240, 264, 291]
+    assert counts[:11] == list(range(0, 110, 10))
+    assert counts[11:] == [110, 121, 134, 148, 163, 180, 198, 218, 240, 264, 291]
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_a_bar_shows_the_time_left_in_eighty_columns(width: int) -> None:
+    """What stands last is cut where there is no room, nothing else; the usual rates are whole."""
+    for rate, whole in (("recovered in training 55%, 5,321/s", True), ("a" * 90, False)):
+        text = io.StringIO()
+        console = Console(file=text, width=width, force_terminal=True, color_system=None)
+        with steps_bar("training", console) as bar:
+            bar.update(bar.add_task("", total=503_808, rate=rate), completed=503_808)
+        line = [each for each in text.getvalue().split("\r") if "503,808/503,808" in each][-1]
+        assert "0:00:00" in line and line.count("━") == (40 if width == 120 else 10)
+        assert (rate in line) == whole and ("…" in line) != whole
 
 
 def test_a_quiet_console_shows_no_progress() -> None:

@@ -27,7 +27,7 @@ class Diagnosis:
     #: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far), "contact"
     #: (more than the feet on the ground), "diverged" (numbers too large), "not quiet" (on its feet,
     #: but not upright and at rest at the end), "off command" (a walk that did not go on as
-    #: commanded), "motion" (a fall from a motion), "error"
+    #: commanded), "motion" (a fall from a motion), "down" (it did not get up), "error"
     loss: str | None = None
     loss_body: str | None = None  #: that touched the ground, where that is the criterion
     #: motor between root and soles that was first at its limit after the first push, for 2 policy

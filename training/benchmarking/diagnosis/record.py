@@ -7,8 +7,13 @@ import numpy as np
 
 from poise.baselines.balance.stepping.controller import SteppingController
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.whole import ResidualWholeEnv
+from poise.baselines.policy_files.controller import PolicyFile
+from poise.baselines.walking.simbicon import Simbicon
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.episode import FAILURES
+
+UNSEEN = (PolicyFile, Simbicon)  #: which step without a plan that can be seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +29,21 @@ class Course:
     foothold: np.ndarray  #: (n, 2) where the foot that swings is to land [m]; NaN: none swings
     swinging: np.ndarray  #: (n,) that foot; −1: none
     failures: np.ndarray  #: (n,) control ticks so far at which the controller's solver failed
+
+
+def swing_of(env: BalanceEnv) -> int | None:
+    """The foot that swings by the plan of the controller in an environment, −1 where none does.
+
+    None where no plan can be seen: of torques, of networks, of classes from outside, of a policy
+    whose servos take over. A controller of this package that plans no steps never swings a foot.
+    """
+    if not isinstance(env, ResidualBalanceEnv) or isinstance(env, ResidualWholeEnv):
+        return None
+    inner = getattr(env.controller, "unwrapped", env.controller)
+    if isinstance(inner, SteppingController):
+        return int(inner.stepping().foot)
+    ours = type(inner).__module__.startswith("poise.") and not isinstance(inner, UNSEEN)
+    return -1 if ours else None
 
 
 class CourseRecord:

@@ -16,8 +16,9 @@ LOSSES = {
     "contact": "fell: {body} touched the ground",
     "diverged": "the simulation diverged",
     "not quiet": "stood at the end, but was not upright and at rest",
-    "off command": "did not walk on as commanded",
+    "off command": "stayed upright, but did not walk on as commanded again",
     "motion": "fell from the motion",
+    "down": "did not get up",
     "error": "the controller raised an error",
 }
 NUMBERS = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
@@ -55,7 +56,10 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
         told.append((d.full_from, f"{d.full_motor} at its limit from {d.full_from:.2f} s, for "
                                   f"{d.full_time:.2f} s"))  # fmt: skip
     if d.failures_from is not None:
-        told.append((d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on"))
+        then = ", when it was falling already" if _fell_before(d) else ""
+        told.append(
+            (d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on{then}")
+        )
     if d.foothold is not None and d.foothold_time is not None:
         told.append((d.foothold_time, f"foothold {d.foothold} by {d.foothold_error:.2f} m at "
                                       f"{d.foothold_time:.2f} s"))  # fmt: skip
@@ -70,7 +74,7 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
 
 def cause(d: Diagnosis, steps: int) -> str:
     """The cause of a loss in a few words, without numbers and sides, to count by."""
-    if d.loss in ("diverged", "error"):
+    if d.loss in ("diverged", "error", "down"):
         return LOSSES[d.loss]
     first = "no motor of the legs at its limit"
     if d.hardware is not None:
@@ -78,8 +82,10 @@ def cause(d: Diagnosis, steps: int) -> str:
     elif d.full_motor is not None:
         first = f"{SIDE.sub('', d.full_motor).strip('_')} at its limit"
     if d.failures_from is not None and d.failures_from <= (d.full_from or float("inf")):
-        first = "QP without a solution"
-    then = {0: "no step", 1: "one step was not enough"}.get(steps, "its steps were not enough")
+        first = first if _fell_before(d) else "QP without a solution"
+    then = {0: "no planned step", 1: "one step was not enough"}.get(
+        steps, "its steps were not enough"
+    )
     slipped = d.foothold == "slipped" and (d.foothold_time or 0.0) <= (d.capture_left or 0.0)
     if slipped or d.foothold == "missed":  # a sole that slips later is one of a robot that falls
         then = f"a foothold {d.foothold}"
@@ -88,6 +94,13 @@ def cause(d: Diagnosis, steps: int) -> str:
     if d.loss == "off command":
         then = "left its command"
     return f"{first}, then {then}"
+
+
+def _fell_before(d: Diagnosis) -> bool:
+    """Whether the capture point had left the support for good when the QP first failed: no torques
+    then bring it back, and a foot that tilts or lifts leaves the QP without the forces that it
+    needs. The failure is a consequence of the fall, not its cause."""
+    return d.failures_from is not None and (d.capture_left or float("inf")) <= d.failures_from
 
 
 def losses(lost: Iterable[tuple[Diagnosis, int]]) -> list[Loss]:

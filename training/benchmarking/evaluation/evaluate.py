@@ -35,6 +35,8 @@ def evaluate(
     limits: str | Path | None = None,
     motions: Sequence[str] = (),
     realism: str | None = None,
+    get_up: bool = False,
+    physics: str | None = None,
     overwrite: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
@@ -60,6 +62,8 @@ def evaluate(
         limits: what pushes are measured by, see `load_limits`.
         motions: names and files of motions, for a suite that performs some, instead of its own.
         realism: a packaged level of realism or a path to one, instead of the suite's.
+        get_up: a robot that falls has 10 s to get up again, which is a figure of its own.
+        physics: a packaged engine or a path to its settings, instead of the suite's.
         overwrite: replace what `out` holds.
         console: where progress and tables are printed; None: nowhere.
         allow: controllers from outside (``module:Class``) that may run though they are not among
@@ -74,7 +78,7 @@ def evaluate(
     run = Run(
         controllers, suite, out, robot, seed, workers, backend, trials, overwrite, console,
         reference=None, measured=lambda loaded: load_limits(loaded, limits), motions=motions,
-        realism=realism,
+        realism=realism, get_up=get_up, physics=physics,
     )  # fmt: skip
     return run.play(plots=True)
 
@@ -91,6 +95,7 @@ def benchmark(
     backend: str = "local",
     trials: int | None = None,
     realism: str | None = None,
+    physics: str | None = None,
     overwrite: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
@@ -103,8 +108,8 @@ def benchmark(
 
     Args:
         controllers: as of `evaluate`; none: `default_controllers`.
-        suite, out, robot, seed, workers, backend, trials, realism, overwrite, console, allow: as of
-            `evaluate`.
+        suite, out, robot, seed, workers, backend, trials, realism, physics, overwrite, console,
+            allow: as of `evaluate`.
 
     Raises:
         ConfigError, PoiseError: as `evaluate`.
@@ -113,6 +118,7 @@ def benchmark(
     run = Run(
         chosen, suite, out, robot, seed, workers, backend, trials,
         overwrite, console, reference=REFERENCE, measured=PushLimits, realism=realism,
+        physics=physics,
     )  # fmt: skip
     return run.play(timed=True)
 

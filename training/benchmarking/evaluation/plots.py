@@ -9,6 +9,7 @@ from poise.training.benchmarking.metrics.played import (
     DIRECTIONAL,
     Played,
     ankle_limits,
+    by_falls,
     fractions,
     part,
     pushes,
@@ -74,7 +75,7 @@ def draw_plots(
     else:
         fits = {name: sectors(own) for name, own in shown.items()}
         fraction = {name: fractions(own) for name, own in shown.items()}
-        unit = f"of the {limits.scale}"
+        unit = f"× {limits.scale}"
         title = f"Recovered fraction of the {limits.scale} by push direction"
         polar_envelope(polar, _series(fits), title=title, unit=unit, note=_left_out(fits))
         label = f"push impulse, as a fraction of the {limits.scale}"
@@ -83,6 +84,7 @@ def draw_plots(
         {name: (fraction[name], won(own)) for name, own in shown.items()},
         {name: fit_logistic(fraction[name], won(own)) for name, own in shown.items()},
         xlabel=label,
+        lost="fallen" if all(map(by_falls, shown.values())) else "not recovered",
     )
     curve = _draw_curve(folder / CURVE, fits, timesteps or {}) if directional else []
     return [polar, fall, *curve]

@@ -19,8 +19,11 @@ from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
 from poise.configs.schema import to_dict
+from poise.envs.physics.engines.config import MUJOCO, Physics, load_physics
+from poise.envs.physics.engines.engine import check_engine
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import IDEAL, load_realism
+from poise.envs.terrain.bumps import Bumps
 from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
 from poise.training.benchmarking.metrics.motions import suite_repertoire, suite_stage
 from poise.training.benchmarking.metrics.pairs import pair_figures
@@ -41,7 +44,7 @@ from poise.training.benchmarking.trials.names import check_name
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit, curves, stepping_limits
 from poise.training.benchmarking.trials.table import trial_row
-from poise.training.benchmarking.trials.trial import Trial
+from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.learning.seeds.records import expand_seeds
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS, plain
@@ -55,6 +58,7 @@ from .tables import print_lost, print_summary, ranked
 from .tick_times import tick_times
 
 FEW = 5  # controllers, of which the rate of each is shown while they play
+GET_UP_TIME = 10.0  # [s] after a fall
 
 
 class Run:
@@ -65,6 +69,7 @@ class Run:
         reference: whom others are compared with, if it takes part; None: the first.
         measured: what pushes on the robot are measured by.
         realism: name or file of a level, instead of the suite's; it is then the only one.
+        physics: name or file of an engine's settings, instead of the suite's.
     """
 
     def __init__(
@@ -72,7 +77,7 @@ class Run:
         workers: int | None, backend: str, trials: int | None, overwrite: bool,
         console: Console | None, *, reference: str | None,
         measured: Callable[[Robot], PushLimits], motions: Sequence[str] = (),
-        realism: str | None = None,
+        realism: str | None = None, get_up: bool = False, physics: str | None = None,
     ):  # fmt: skip
         self.started, self.console = time.perf_counter(), console or Console(quiet=True)
         names = expand_seeds(controllers)
@@ -85,6 +90,11 @@ class Run:
             self.suite = self.suite.resized(trials)
         if realism is not None:
             self.suite = replace(self.suite, realism=realism, levels=())
+        if get_up:
+            self.suite = replace(self.suite, get_up_time=GET_UP_TIME)
+        if physics is not None:
+            self.suite = replace(self.suite, physics=physics)
+        engine = load_physics(self.suite.physics)
         for level in (self.suite.realism, *self.suite.levels):
             load_realism(level)
         self.out, self.overwrite, self.executor = Path(out), overwrite, Executor(backend, workers)
@@ -97,12 +107,13 @@ class Run:
             "robot": str(robot),
             "robot_fingerprint": self.robot.fingerprint,
             "seed": seed,
-            "versions": versions(("mujoco", "numpy", "numba")),
+            "versions": versions((*dict.fromkeys(("mujoco", engine.engine)), "numpy", "numba")),
         }
         check_folder(self.out, known, overwrite)
         self.limits, self.reference = measured(self.robot), reference
         self.repertoire = suite_repertoire(self.suite, self.robot, self.out, overwrite)
-        self._plan(seed, names)  # refuses what does not fit the robot
+        plan = self._plan(seed, names)  # refuses what does not fit the robot
+        _check_engine(engine, self.robot, plan)
         if self.suite.walks:
             for name in names:
                 check_may_walk(name, f"suite {suite}")
@@ -203,6 +214,8 @@ class Run:
         }  # fmt: skip
         if suite.realism != IDEAL:
             whole["realism"] = suite.realism
+        if suite.physics != MUJOCO:
+            whole["physics"] = suite.physics
         return plain(whole)
 
     def _load_others(self, settings: Settings) -> None:
@@ -236,7 +249,7 @@ class Run:
 
         rates = Rates(plan.names)
         for (name, _), outcome in folder.finished.items():
-            rates.add(name, outcome.recovered)
+            rates.add(name, outcome)
         with progress_bar(self.console) as bar, contextlib.ExitStack() as working:
             task = bar.add_task("", total=plan.count, completed=len(folder.finished), rates="")
             executor = None
@@ -244,7 +257,7 @@ class Run:
                 executor = executor or working.enter_context(self.executor)
                 for job, outcome in executor.each(play, jobs):
                     folder.append(job.controller, job.trial.number, outcome)
-                    rates.add(job.controller, outcome.recovered)
+                    rates.add(job.controller, outcome)
                     bar.update(task, completed=len(folder.finished), rates=str(rates))
 
 
@@ -257,21 +270,28 @@ def compared(
 
 
 class Rates:
-    """Recovered rates so far as text: of each controller, or of many taken together."""
+    """The rates of trials without a fall and of recovered ones so far as text: of each controller,
+    or of many taken together.
+
+    Of a walk, recovered is to have gone on as commanded.
+    """
 
     def __init__(self, names: Sequence[str]):
         self._together = len(names) > FEW
-        self._counts = {"" if self._together else name: [0, 0] for name in names}
+        self._counts = {"" if self._together else name: [0, 0, 0] for name in names}
 
-    def add(self, name: str, recovered: bool) -> None:
+    def add(self, name: str, outcome: Outcome) -> None:
         """Count a trial."""
-        count = self._counts.setdefault("" if self._together else name, [0, 0])
-        count[0] += recovered
-        count[1] += 1
+        count = self._counts.setdefault("" if self._together else name, [0, 0, 0])
+        for k, one in enumerate((outcome.upright, outcome.recovered, True)):
+            count[k] += one
 
     def __str__(self) -> str:
-        rates = ((name, won / trials) for name, (won, trials) in self._counts.items() if trials)
-        return "  ".join(f"{name} {rate:.0%}".lstrip() for name, rate in rates)
+        return "  ".join(
+            f"{name} {upright / trials:.0%}, {recovered / trials:.0%}".lstrip()
+            for name, (upright, recovered, trials) in self._counts.items()
+            if trials
+        )
 
 
 def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | None) -> None:
@@ -284,6 +304,15 @@ def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | N
             raise ConfigError(f"must be at least {least}, not {value}", field=name)
     if trials is not None and trials > MOST_TRIALS:
         raise ConfigError(f"must be at most {MOST_TRIALS}", field="trials")
+
+
+def _check_engine(engine: Physics, robot: Robot, plan: Plan) -> None:
+    """Raise ConfigError where the engine cannot hold the robot, a trial's terrain or its bumps."""
+    levels = dict.fromkeys(trial.conditions.realism for trial in plan.first)
+    bumps = [Bumps() for level in levels if load_realism(level).bumpy]
+    built = [trial.terrain for trial in plan.first if trial.terrain and not trial.terrain.flat]
+    for terrain in [None, *bumps[:1], *built[:1]]:
+        check_engine(engine, robot, terrain)
 
 
 def _warm_up(agents: Iterable[Agent]) -> None:

@@ -12,7 +12,9 @@ from rich.table import Table
 from poise.baselines.allowance import allow_words
 from poise.training.benchmarking.diagnosis.words import told_losses
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
+from poise.training.benchmarking.trials.agents import code_of
 from poise.training.running.columns import (
+    AS_COMMANDED,
     AT_REST,
     ETA_MEAN,
     ETA_WORST,
@@ -22,20 +24,22 @@ from poise.training.running.columns import (
     J50_MEAN,
     J50_WORST,
     LOST_WON,
-    NEVER_FELL,
     NONE,
+    NOT_FALLEN,
     P_VALUE,
     PAIRED,
     RECOVERED,
     ROBUST,
     STEPS_TAKEN,
+    UP_AGAIN,
     known,
 )
 from poise.training.running.summary import Entry, Summary
 from poise.training.running.tables import figure_table
 from poise.training.running.terminal import BESIDE, in_parts
+from poise.training.running.trial_figures import NOT_FALLEN as CRITERION
 
-from .walk_tables import level_tables, motion_tables, scenario_tables, walk_tables
+from .walk_tables import lasting_tables, level_tables, motion_tables, scenario_tables, walk_tables
 
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
 SEPARATED = 0.05  # p below which the trials separate two controllers
@@ -46,10 +50,17 @@ IN_PAIRS = (LOST_WON.heading, P_VALUE.heading)  # headings whose figures the tab
 def ranked(entries: Mapping[str, Entry]) -> list[str]:
     """Controllers, the best first: by mean J50, else by the fraction of the limit, else by rate.
 
-    Those that took a force from nowhere come last.
+    The rate is that of the trials without a fall where all walk, else that of recovered ones. Of
+    equal ones the one with more recovered trials is first. Those that took a force from nowhere
+    come last.
     """
     key = _measure(entries)[0]
-    return sorted(entries, key=lambda name: (assisted(entries[name]), -_value(entries[name], key)))
+
+    def order(name: str) -> tuple[bool, float, float]:
+        entry = entries[name]
+        return assisted(entry), -_value(entry, key), -entry["recovered_rate"]
+
+    return sorted(entries, key=order)
 
 
 def places(
@@ -77,7 +88,12 @@ def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
     for key, form in (("j50_mean", ".1f"), ("fraction50", ".2f")):
         if all(key in entry for entry in entries.values()):
             return key, form
-    return "recovered_rate", ".2f"
+    return ("never_fell_rate" if walked(entries) else "recovered_rate"), ".2f"
+
+
+def walked(entries: Mapping[str, Entry]) -> bool:
+    """Whether all are judged by falls, see `Entry.criterion`."""
+    return all(entry.get("criterion") == CRITERION for entry in entries.values())
 
 
 def _value(entry: Entry, key: str) -> float:
@@ -87,7 +103,10 @@ def _value(entry: Entry, key: str) -> float:
 def print_summary(summary: Summary, console: Console) -> None:
     """Tables of the controllers and of the pairs, errors, a line per group of training seeds."""
     robot = summary["robot"]["name"]
-    title = escape(f"{summary['suite']} · {robot} · seed {summary['seed']}")
+    told = [summary["suite"], robot, f"seed {summary['seed']}"]
+    if "physics" in summary:
+        told.append(summary["physics"])
+    title = escape(" · ".join(told))
     cells = {
         heading: texts
         for heading, texts in table_cells(summary).items()
@@ -104,7 +123,7 @@ def print_summary(summary: Summary, console: Console) -> None:
         for name, row in zip(names, zip(*(cells[h] for h in part), strict=True), strict=True):
             table.add_row(str(rank[name] or NONE), escape(name), *row)
         console.print(table)
-    special = walk_tables, motion_tables, level_tables, scenario_tables
+    special = walk_tables, motion_tables, level_tables, scenario_tables, lasting_tables
     for each in (table for tables in special for table in tables(summary)):
         console.print(each)
     if summary["pairs"]:
@@ -119,9 +138,14 @@ def print_summary(summary: Summary, console: Console) -> None:
 def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     """What the tables' words mean, of those that are there."""
     notes = []
-    if any(heading.startswith(HALF_AT.name) for heading in headings):
-        notes.append(f"{HALF_AT.name}: half of the pushes that are this fraction of the "
-                     f"{summary['scale']} are recovered; larger is better")  # fmt: skip
+    if (half := replace(HALF_AT, unit=f"× {summary['scale']}").heading) in headings:
+        notes.append(f"{half}: half of the pushes of this size are recovered, with the 95 % "
+                     "interval; larger is better")  # fmt: skip
+    if walked(summary["controllers"]):
+        notes.append(f"J50, the order and pairs of walks are by falls; {NOT_FALLEN.name} is of the "
+                     f"pushes that all meet; {AS_COMMANDED.name}: the last two strides are as near "
+                     "to the command as the controller's own before the push, within 0.05 m/s and "
+                     "5 °/s")  # fmt: skip
     if STEPS_TAKEN.heading in headings:
         notes.append(f"{STEPS_TAKEN.heading}: of all trials, those that were lost too")
     of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
@@ -145,7 +169,7 @@ def print_lost(
     """The numbers of trials that each controller has lost, why, and how to look at one of them.
 
     Args:
-        lost: name → the numbers of the trials that it did not recover.
+        lost: name → the numbers of the trials that it did not recover, of walks those that fell.
         entries: of the summary.
         folder: of the result.
         console: where the lines are printed.
@@ -156,7 +180,7 @@ def print_lost(
         some = ", ".join(str(number) for number in numbers[:SHOWN])
         more = f", … ({len(numbers)})" if len(numbers) > SHOWN else ""
         command = ["poise", "view", str(folder), "--trial", str(numbers[0]), "--controllers", name]
-        command += allow_words(name)
+        command += allow_words(code_of(name))
         lines = [f"lost trials of {name}: {some}{more} ({shlex.join(command)})"]
         if told := told_losses(entries[name].get("losses", [])):
             lines.append(f"  {told}")
@@ -170,11 +194,16 @@ def table_cells(summary: Summary) -> dict[str, list[str]]:
     entries = [summary["controllers"][name] for name in summary["ranking"]]
     told = [{**summary["controllers"][name], **pairs.get(name, {})} for name in summary["ranking"]]
     of_mix = f" of the {summary['rated']}" if summary["rated"] else ""
+    recovered = replace(RECOVERED, name=f"{RECOVERED.name}{of_mix}")
+    rates = (recovered, NOT_FALLEN)
+    if walked(summary["controllers"]):
+        rates = (NOT_FALLEN, AS_COMMANDED)
     figures = (
         *(J50_WORST, ETA_MEAN, ETA_WORST),
-        replace(HALF_AT, name=f"{HALF_AT.name}, of {summary['scale']}"),
-        replace(RECOVERED, name=f"{RECOVERED.name}{of_mix}"),
-        *(NEVER_FELL, LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
+        replace(HALF_AT, unit=f"× {summary['scale']}"),
+        *rates,
+        *UP_AGAIN,
+        *(LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
     )
     return {
         J50_MEAN.heading: [j50_mean_text(entry) for entry in entries],

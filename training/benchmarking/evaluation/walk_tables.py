@@ -11,6 +11,8 @@ from poise.training.running.columns import (
     FALLS,
     FELL,
     FOLLOWED,
+    GUSTS,
+    HELD,
     IN_MOTION,
     J50,
     NONE,
@@ -29,12 +31,11 @@ MEAN = "mean of the motions"
 
 
 def walk_tables(summary: Summary) -> Iterator[Table]:
-    """Three of the levels of each controller, and one of J50 by phase; as far as there are any."""
+    """Four of the levels of each controller, and one of J50 by phase; as far as there are any."""
     entries = summary["controllers"]
     for name in summary["ranking"]:
         levels = entries[name].get("walks", [])
-        as_told = replace(FALLS[-1], ends="")  # there is no room for its interval
-        for figures in ((*FALLS[1:-1], as_told, *FOLLOWED), STEPS, COSTS):
+        for figures in (FALLS[1:], FOLLOWED, STEPS, COSTS):
             if shown := known(figures, levels):
                 rows = (([level["level"]], level) for level in levels)
                 yield figure_table(name, ["command"], shown, rows)
@@ -115,3 +116,13 @@ def scenario_tables(summary: Summary) -> Iterator[Table]:
             own = {each["scenario"]: each for each in found}
             rows.append([controller, *(scenario_cell(own.get(name)) for name in names)])
         yield text_table("without a fall", ["controller"], names, rows)
+
+
+def lasting_tables(summary: Summary) -> Iterator[Table]:
+    """One of pushes that last, one of gusts, as far as the suite has them."""
+    entries = [(name, summary["controllers"][name]) for name in summary["ranking"]]
+    if rows := [([name, own["profile"]], own) for name, entry in entries
+                for own in entry.get("sustained", ())]:  # fmt: skip
+        yield figure_table("sustained pushes", ["controller", "profile"], HELD, rows)
+    if gusts := [([name], entry["gusts"]) for name, entry in entries if "gusts" in entry]:
+        yield figure_table("gusts from one side", ["controller"], GUSTS, gusts)

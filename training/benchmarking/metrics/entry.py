@@ -10,13 +10,13 @@ from poise.training.benchmarking.diagnosis.words import losses
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
 from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.statistics.eurobench import HUMAN_COM_HEIGHT
-from poise.training.benchmarking.statistics.fits import fit_logistic
 from poise.training.benchmarking.statistics.rates import eta
 from poise.training.benchmarking.suites.plan import Plan, at_level
 from poise.training.benchmarking.suites.scenarios import PART as SCENARIOS
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit
+from poise.training.benchmarking.trials.trial import won as is_won
 from poise.training.running.summary import (
     Direction,
     Entry,
@@ -26,14 +26,16 @@ from poise.training.running.summary import (
     RobotFigures,
     Sector,
 )
-from poise.training.running.trial_figures import ScenarioFigures
+from poise.training.running.trial_figures import NOT_FALLEN, RECOVERED, ScenarioFigures
 
 from .factors import eurobench_figures, factor_figures
+from .lasting import gust_figures, sustained_figures
 from .motions import in_motion, motion_levels
 from .played import (
     DIRECTIONAL,
     Played,
     ankle_limits,
+    by_falls,
     cells,
     counts,
     fitted,
@@ -54,12 +56,13 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
     """All figures of one controller; `steps` is the limit of one that steps."""
     everything, played = played, once(played)
     entry: Entry = {
-        **counts([outcome for _, outcome in rated(played)]),
+        **counts(rated(played)),
+        "criterion": NOT_FALLEN if by_falls(rated(played)) else RECOVERED,
         "root_force_max": max((outcome.root_force or 0.0) for _, outcome in played),
         "played": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
-    if found := losses((outcome, outcome.steps) for _, outcome in played):
+    if found := losses((o, o.steps) for t, o in played if not is_won(t, o)):
         entry["losses"] = found
     if directional := part(played, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))
@@ -71,6 +74,10 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         entry["motions"], entry["in_motion"] = motions, in_motion(played)
     if scenarios := _scenarios(part(played, SCENARIOS)):
         entry["scenarios"] = scenarios
+    if sustained := part(played, "sustained"):
+        entry["sustained"] = sustained_figures(sustained, plan.limits.robot.mass)
+    if gusts := part(played, "gusts"):
+        entry["gusts"] = gust_figures(gusts)
     if random := part(played, "random"):
         entry.update(_fractions(random, plan.limits))
     if factors := factor_figures(part(played, "factors"), plan.standard):
@@ -128,15 +135,17 @@ def envelope(
 
 
 def _fractions(played: Played, limits: PushLimits) -> Fractions:
-    fit, by_sector = fit_logistic(fractions(played), won(played)), sectors(played)
+    together = mean_over_directions(np.zeros(len(played)), fractions(played), won(played))
+    (one,), by_sector = together.fits, sectors(played)
     found = [
         {"direction": angle, **fitted(f, "fraction50")}
         for angle, f in zip(by_sector.directions, by_sector.fits, strict=True)
     ]
     return {
         "fraction_of": limits.scale,
-        "fraction50": fit.j50,
-        "fraction50_bound": fit.bound,
+        "fraction50": one.fit.j50,
+        "fraction50_ci95": one.j50_ci,
+        "fraction50_bound": one.fit.bound,
         "sectors": cast(list[Sector], found),
     }
 
@@ -144,9 +153,9 @@ def _fractions(played: Played, limits: PushLimits) -> Fractions:
 def _scenarios(played: Played) -> list[ScenarioFigures]:
     """Of each scenario that a controller has played, in the order of the suite."""
     found: list[ScenarioFigures] = []
-    for name, outcomes in cells(played, lambda trial: str(trial.level)).items():
-        figures: ScenarioFigures = {"scenario": name, **counts(outcomes)}
-        if speeds := [o.speed_ahead for o in outcomes if o.speed_ahead is not None]:
+    for name, own in cells(played, lambda trial: str(trial.level)).items():
+        figures: ScenarioFigures = {"scenario": name, **counts(own)}
+        if speeds := [o.speed_ahead for _, o in own if o.speed_ahead is not None]:
             figures["speed_ahead"] = sum(speeds) / len(speeds)
         found.append(figures)
     return found
@@ -161,18 +170,21 @@ def _levels(played: Played, suite: Suite) -> list[RealismLevel]:
     found: list[RealismLevel] = []
     for level in (None, *suite.levels):
         every = named([name for name in suite.parts if name != "factors"], level)
-        counted = counts([outcome for _, outcome in named(RANDOM, level) or every])
+        counted = counts(named(RANDOM, level) or every)
         here: RealismLevel = {
             "level": Path(level or suite.realism).stem,
             "trials": counted["trials"],
             "recovered": counted["recovered"],
             "recovered_rate": counted["recovered_rate"],
             "recovered_ci95": counted["recovered_ci95"],
+            "fallen": counted["fallen"],
+            "never_fell_rate": counted["never_fell_rate"],
+            "never_fell_ci95": counted["never_fell_ci95"],
             "torque_variation_median": counted["torque_variation_median"],
             "energy_median": counted["energy_median"],
         }
         if quiet := named(["quiet"], level):
-            stood = [not outcome.fallen and outcome.error is None for _, outcome in quiet]
+            stood = [outcome.upright for _, outcome in quiet]
             here["stood"], here["unpushed"] = sum(stood), len(stood)
         if aimed := named(DIRECTIONAL, level):
             direction, impulse, _ = pushes(aimed)

@@ -1,6 +1,6 @@
 """Figures of factors that are varied alone, and EUROBENCH's indicators."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from poise.training.benchmarking.statistics.eurobench import (
     Size,
@@ -21,12 +21,11 @@ NAMED = ("body", "realism")  # factors whose levels are names, not numbers
 
 def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
     """Recovered rate of every level, and what it lost and won against the standard case."""
-    outcomes = cells(played, lambda trial: (str(trial.factor), str(trial.level)))
-    recoveries = {cell: [outcome.recovered for outcome in own] for cell, own in outcomes.items()}
-    base = recoveries.pop((STANDARD, STANDARD), [])
+    found_cells = cells(played, lambda trial: (str(trial.factor), str(trial.level)))
+    base = found_cells.pop((STANDARD, STANDARD), [])
     found: dict[str, list[Level]] = {}
-    for (factor, level), recovered in recoveries.items():
-        found.setdefault(factor, []).append(_level(level, recovered, base))
+    for (factor, level), own in found_cells.items():
+        found.setdefault(factor, []).append(_level(level, own, base))
     for factor, levels in found.items():
         levels.append({**_level(standard[factor], base, base), "standard": True})
         if factor not in NAMED:
@@ -35,13 +34,14 @@ def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
             for factor, levels in found.items()]  # fmt: skip
 
 
-def _level(level: str, recovered: Sequence[bool], base: Sequence[bool]) -> Level:
-    lost = sum(b and not r for r, b in zip(recovered, base, strict=True))
-    gained = sum(r and not b for r, b in zip(recovered, base, strict=True))
+def _level(level: str, played: Played, base: Played) -> Level:
+    pairs = list(zip(won(played).tolist(), won(base).tolist(), strict=True))
+    lost = sum(b and not r for r, b in pairs)
+    gained = sum(r and not b for r, b in pairs)
     return {
         "level": level,
         "standard": False,
-        **rate(recovered),
+        **rate(played),
         "lost": lost,
         "won": gained,
         "p_mcnemar": mcnemar(lost, gained),

@@ -13,7 +13,7 @@ from poise.training.benchmarking.statistics.rates import mean_or_none, wilson_in
 from poise.training.benchmarking.suites.motions import PART, STANDING
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.jobs import Stage
-from poise.training.benchmarking.trials.trial import Outcome
+from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.motion.following.follow import LONGEST
 from poise.training.motion.following.repertoire import (
     Repertoire,
@@ -39,21 +39,23 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
     """What all trials of a suite share, whose results are in `folder`."""
     chosen = suite.motions
     if chosen is None:
-        return Stage(robot, suite.duration, suite.noise)
+        again = suite.get_up_time or (None if suite.get_up is None else 0.0)
+        return Stage(robot, suite.duration, suite.noise, get_up=again, physics=suite.physics)
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
-    return Stage(robot, LONGEST, suite.noise, ((STANDING, STANDING), *files), chosen.tempo)
+    motions = ((STANDING, STANDING), *files)
+    return Stage(robot, LONGEST, suite.noise, motions, chosen.tempo, physics=suite.physics)
 
 
 def motion_levels(played: Played) -> list[MotionLevel]:
     """Every share of J50: each motion, and all of several; [] where nothing is performed."""
     moving = part(played, PART)
-    found: dict[tuple[float, str | None], list[Outcome]] = {}
+    found: dict[tuple[float, str | None], list[tuple[Trial, Outcome]]] = {}
     found |= cells(moving, lambda trial: (trial.share or 0.0, trial.motion))
     if len({trial.motion for trial, _ in moving}) > 1:
         found |= cells(moving, lambda trial: (trial.share or 0.0, None))
     ordered = sorted(found, key=lambda key: (key[0], key[1] is None))
-    return [_level(*key, found[key]) for key in ordered]
+    return [_level(*key, [outcome for _, outcome in found[key]]) for key in ordered]
 
 
 def _level(share: float, name: str | None, outcomes: Sequence[Outcome]) -> MotionLevel:

@@ -7,6 +7,7 @@ from poise.training.benchmarking.statistics.bootstrap import j50_gain
 from poise.training.benchmarking.statistics.differences import paired_rates, relative_gain
 from poise.training.benchmarking.statistics.rates import mcnemar
 from poise.training.benchmarking.trials.trial import Outcome, Trial
+from poise.training.benchmarking.trials.trial import won as is_won
 from poise.training.running.summary import Entry, Pair, Paired
 
 from .played import DIRECTIONAL, Played, part, pushes, rated, won
@@ -44,12 +45,12 @@ def alike(a: Played, b: Played) -> list[tuple[Trial, Outcome, Outcome]]:
 
 def paired(met: list[tuple[Trial, Outcome, Outcome]]) -> Paired | None:
     """Counts of the trials that both met; None without any."""
-    return counted((one.recovered, two.recovered) for _, one, two in met)
+    return counted((is_won(trial, one), is_won(trial, two)) for trial, one, two in met)
 
 
-def counted(recovered: Iterable[tuple[bool, bool]]) -> Paired | None:
-    """Counts of trials by who recovered them, a or b, with McNemar's test of them."""
-    found = Counter(recovered)
+def counted(won_by: Iterable[tuple[bool, bool]]) -> Paired | None:
+    """Counts of trials by who won them, a or b, with McNemar's test of them."""
+    found = Counter(won_by)
     if not found:
         return None
     both, only_a = found[True, True], found[True, False]

@@ -14,12 +14,14 @@ from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.running.trial_figures import Counts, Rate
+from poise.training.benchmarking.trials.trial import won as is_won
+from poise.training.running.trial_figures import Counts, Rate, Rising
 
 Key = TypeVar("Key")
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
 RATED = ("mix", "motions")  # parts that the counts are of, where a suite has one
-DIRECTIONAL = ("envelope", "grid", "walk_push")  # parts that J50 of each direction is fitted to
+WALK_PUSH = "walk_push"
+DIRECTIONAL = ("envelope", "grid", WALK_PUSH)  # parts that J50 of each direction is fitted to
 SECTOR = 45.0  # [deg] in which random directions are counted together
 
 
@@ -34,15 +36,29 @@ def once(played: Played) -> Played:
 
 
 def rated(played: Played) -> Played:
-    """The trials that a controller is rated by: those of the mix, else all that is played once."""
-    return part(played, *RATED) or once(played)
+    """The trials that a controller is rated by: those of the mix, else all that is played once.
+
+    Of pushed walks those that all controllers meet: a second stage is harder the better they are.
+    """
+    return part(played, *RATED) or met_by_all(once(played))
 
 
-def cells(played: Played, key: Callable[[Trial], Key]) -> dict[Key, list[Outcome]]:
-    """The outcomes of the trials that have this in common, in the order of the first of them."""
-    found: dict[Key, list[Outcome]] = {}
+def met_by_all(played: Played) -> Played:
+    """The trials without the second stage of pushed walks, whose pushes a controller chose."""
+    return [(trial, outcome) for trial, outcome in played
+            if trial.part != WALK_PUSH or trial.stage == 1]  # fmt: skip
+
+
+def by_falls(played: Played) -> bool:
+    """Whether all of these trials are won by not falling, see `Trial.judged_by_falls`."""
+    return bool(played) and all(trial.judged_by_falls for trial, _ in played)
+
+
+def cells(played: Played, key: Callable[[Trial], Key]) -> dict[Key, list[tuple[Trial, Outcome]]]:
+    """The trials that have this in common, in the order of the first of them."""
+    found: dict[Key, list[tuple[Trial, Outcome]]] = {}
     for trial, outcome in played:
-        found.setdefault(key(trial), []).append(outcome)
+        found.setdefault(key(trial), []).append((trial, outcome))
     return found
 
 
@@ -54,8 +70,8 @@ def pushes(played: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def won(played: Played) -> np.ndarray:
-    """An array (n,), true where a trial was recovered."""
-    return np.array([outcome.recovered for _, outcome in played], dtype=bool)
+    """An array (n,), true where a trial was won: recovered, or of a walk not fallen."""
+    return np.array([is_won(trial, outcome) for trial, outcome in played], dtype=bool)
 
 
 def fractions(played: Played) -> np.ndarray:
@@ -82,23 +98,27 @@ def fitted(one: DirectionFit, name: str) -> dict[str, Any]:
     }
 
 
-def rate(recovered: Sequence[bool]) -> Rate:
-    """The count of recovered trials and their rate, with its interval."""
-    trials, count = len(recovered), int(sum(recovered))
+def rate(played: Played) -> Rate:
+    """The counts of recovered and of fallen trials, and their rates, with intervals."""
+    trials = len(played)
+    recovered = sum(outcome.recovered for _, outcome in played)
+    upright = sum(outcome.upright for _, outcome in played)
     return {
         "trials": trials,
-        "recovered": count,
-        "recovered_rate": count / trials,
-        "recovered_ci95": wilson_interval(count, trials),
+        "recovered": recovered,
+        "recovered_rate": recovered / trials,
+        "recovered_ci95": wilson_interval(recovered, trials),
+        "fallen": sum(outcome.fallen for _, outcome in played),
+        "never_fell_rate": upright / trials,
+        "never_fell_ci95": wilson_interval(upright, trials),
     }
 
 
-def counts(outcomes: Sequence[Outcome]) -> Counts:
-    """Counts of how trials ended, and medians of what was recorded."""
-    standing = [outcome for outcome in outcomes if outcome.recovered]
+def counts(played: Played) -> Counts:
+    """Counts of how trials ended, and medians of what was recorded, some of those that were won."""
+    outcomes = [outcome for _, outcome in played]
+    standing = [outcome for trial, outcome in played if is_won(trial, outcome)]
     unpushed = [outcome for outcome in outcomes if outcome.com_drift is not None]
-    trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
-    stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
 
     def over(
         name: str, function: Callable[[list[float]], float], chosen: Sequence[Outcome] = outcomes
@@ -108,10 +128,7 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
         return float(function(values)) if values else None
 
     return {
-        **rate([outcome.recovered for outcome in outcomes]),
-        "fallen": fallen,
-        "never_fell_rate": stood / trials,
-        "never_fell_ci95": wilson_interval(stood, trials),
+        **rate(played),
         "recovered_with_step": sum(outcome.foot_displaced for outcome in standing),
         "recovered_in_place": sum(o.steps == 0 and not o.foot_displaced for o in standing),
         "steps_mean": over("steps", np.mean),
@@ -129,9 +146,25 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
         "peak_torque_median": over("peak_torque", np.median),
         "mean_abs_action": over("mean_abs_action", np.mean),
         "mean_abs_action_max": over("mean_abs_action", np.max),
+        **rising(outcomes),
         "com_drift_max": over("com_drift", np.max),
         "foot_drift_max": over("foot_drift", np.max),
         "unpushed_lean_max": over("final_lean", np.max, unpushed),
+    }
+
+
+def rising(outcomes: Sequence[Outcome]) -> Rising:
+    """Of the robots that were down and watched, the fraction that was up again, and when."""
+    watched = [outcome for outcome in outcomes if outcome.up_again is not None]
+    if not watched:
+        return {}
+    up = sum(bool(outcome.up_again) for outcome in watched)
+    times = [each.up_time for each in watched if each.up_time is not None]
+    return {
+        "downs": len(watched),
+        "up_again_rate": up / len(watched),
+        "up_again_ci95": wilson_interval(up, len(watched)),
+        "up_time_median": float(np.median(times)) if times else None,
     }
 
 
@@ -142,6 +175,6 @@ def ankle_limits(played: Played, limits: PushLimits) -> np.ndarray:
 
 
 def lost(played: Played) -> list[int]:
-    """The numbers of the trials of the suite's own level that were not recovered, rising: those
-    whose causes are counted."""
-    return [trial.number for trial, outcome in once(played) if not outcome.recovered]
+    """The numbers of the trials of the suite's own level that were not won, rising: those whose
+    causes are counted."""
+    return [trial.number for trial, outcome in once(played) if not is_won(trial, outcome)]

@@ -1,22 +1,16 @@
 """Figures of trials that walk: falls per minute, how exact, at what cost; J50 by phase."""
 
-from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
 
 from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
-from poise.training.benchmarking.statistics.rates import (
-    mean_or_none,
-    poisson_interval,
-    wilson_interval,
-)
+from poise.training.benchmarking.statistics.rates import mean_or_none, poisson_interval
 from poise.training.benchmarking.suites.walking import WALKING
-from poise.training.benchmarking.trials.trial import Outcome
 from poise.training.running.summary import EnvelopeFigures
 from poise.training.running.trial_figures import PhaseJ50, StepsAsTold, WalkLevel, WalkMeans
 
-from .played import Played, cells, part, rate
+from .played import Played, cells, met_by_all, part, rate, won
 
 PHASES = 8  # of a stride
 AS_TOLD = 0.1  # of a step parameter, within which a walk follows its command
@@ -25,31 +19,31 @@ MEANS = tuple(WalkMeans.__annotations__)
 
 
 def walk_levels(played: Played, duration: float) -> list[WalkLevel]:
-    """The levels of the parts that walk, in the order of the suite; trials last `duration` [s]."""
-    found = cells(part(played, *WALKING), lambda trial: (trial.part, str(trial.level)))
-    return [_level(*key, outcomes, duration) for key, outcomes in found.items()]
+    """The levels of the parts that walk, in the order of the suite; trials last `duration` [s].
+
+    Of pushes whose J50 is measured, those that all controllers meet.
+    """
+    walked = met_by_all(part(played, *WALKING))
+    found = cells(walked, lambda trial: (trial.part, str(trial.level)))
+    return [_level(*key, own, duration) for key, own in found.items()]
 
 
-def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -> WalkLevel:
+def _level(name: str, text: str, played: Played, duration: float) -> WalkLevel:
+    outcomes = [outcome for _, outcome in played]
     fallen = sum(outcome.fallen for outcome in outcomes)
-    stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
-    played = [each for each in outcomes if each.error is None]
-    times = [duration if each.fall_time is None else each.fall_time for each in played]
+    walked = [each for each in outcomes if each.error is None]
+    times = [duration if each.fall_time is None else each.fall_time for each in walked]
     minutes = sum(times) / 60.0
     low, high = poisson_interval(fallen)
     means = {key: mean_or_none([getattr(each, key) for each in outcomes]) for key in MEANS}
     told: StepsAsTold = {}
     if name == "gait":
-        kept = [not each.fallen and each.error is None and (each.step_error or 0.0) <= AS_TOLD
-                for each in outcomes]  # fmt: skip
+        kept = [each.upright and (each.step_error or 0.0) <= AS_TOLD for each in outcomes]
         told = {"steps_as_told_rate": sum(kept) / len(kept)}
     return {
         "part": name,
         "level": text,
-        **rate([outcome.recovered for outcome in outcomes]),
-        "fallen": fallen,
-        "never_fell_rate": stood / len(outcomes),
-        "never_fell_ci95": wilson_interval(stood, len(outcomes)),
+        **rate(played),
         "minutes": minutes,
         "falls_per_minute": fallen / minutes if minutes else None,
         "falls_per_minute_ci95": (low / minutes, high / minutes) if minutes else None,
@@ -62,19 +56,19 @@ def phase_figures(played: Played, envelope: EnvelopeFigures) -> list[PhaseJ50]:
     """J50 [N·s] in each of 8 phases of the stride, over all directions.
 
     Impulses are measured by the J50 of their direction; the fraction of it that half of the pushes
-    of a phase are recovered from, times the mean J50, is the phase's. Trials whose phase is not
+    of a phase do not make it fall at, times the mean J50, is the phase's. Trials whose phase is not
     known, because the robot had not walked long enough, are left out.
     """
     j50 = {entry["direction"]: entry["j50"] for entry in envelope["directions"]}
-    phase, fraction, recovered = [], [], []
-    for trial, outcome in played:
+    phase, fraction, upright = [], [], []
+    for (trial, outcome), held in zip(played, won(played), strict=True):
         if outcome.push_phase is not None and trial.push is not None and j50[trial.push.direction]:
             phase.append(np.floor(PHASES * outcome.push_phase) % PHASES)
             fraction.append(trial.push.impulse / j50[trial.push.direction])
-            recovered.append(outcome.recovered)
+            upright.append(held)
     if not phase:
         return []
-    fit, mean = mean_over_directions(phase, fraction, recovered), envelope["j50_mean"]
+    fit, mean = mean_over_directions(phase, fraction, upright), envelope["j50_mean"]
     return [
         {
             "phase": (k + 0.5) / PHASES,

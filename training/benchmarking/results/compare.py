@@ -11,7 +11,14 @@ from rich.table import Table
 from poise.training.benchmarking.evaluation.folder import Settings
 from poise.training.benchmarking.metrics.pairs import counted
 from poise.training.benchmarking.statistics.differences import difference
-from poise.training.running.columns import ETA_MEAN, J50_MEAN, RECOVERED
+from poise.training.running.columns import (
+    AS_COMMANDED,
+    ETA_MEAN,
+    J50_MEAN,
+    NOT_FALLEN,
+    RECOVERED,
+    Figure,
+)
 from poise.training.running.summary import Entry, Level, both_ends
 from poise.training.running.trial_figures import Interval, Rate
 
@@ -113,9 +120,9 @@ def print_comparison(found: Comparison, a: str | Path, b: str | Path, console: C
     console.print(table)
 
 
-def _outcomes(results: Results, name: str) -> dict[tuple[str, ...], bool]:
-    """A mapping from what a trial must share to be a pair, to whether the controller recovered."""
-    return {record.met: record.recovered for record in results.of(name)}
+def _outcomes(results: Results, name: str) -> dict[tuple[str, ...], tuple[bool, bool]]:
+    """A mapping from what a trial must share to be a pair, to how it ended."""
+    return {record.met: (record.recovered, record.upright) for record in results.of(name)}
 
 
 def _changes(name: str, a: Results, b: Results) -> Iterator[Change]:
@@ -127,10 +134,13 @@ def _changes(name: str, a: Results, b: Results) -> Iterator[Change]:
                                  (two["eta_mean"], two["eta_mean_ci95"]))  # fmt: skip
     if a.summary["rated"] == b.summary["rated"]:
         rated = a.summary["rated"]
-        title = f"{RECOVERED.name} of the {rated}" if rated else RECOVERED.name
-        yield from _rates(name, title, one, two, a, b, part=rated)
+        walked = one.get("criterion") == two.get("criterion") == "not fallen"
+        for figure in (NOT_FALLEN, AS_COMMANDED) if walked else (RECOVERED, NOT_FALLEN):
+            title = f"{figure.name} of the {rated}" if rated else figure.name
+            yield from _rates(name, title, figure, one, two, a, b, part=rated)
     for (factor, level), before, after in _levels(one, two):
-        yield from _rates(name, f"{factor} {level}", before, after, a, b, factor, level)
+        title = f"{factor} {level}"
+        yield from _rates(name, title, RECOVERED, before, after, a, b, factor, level)
     angles = {d["direction"]: d for d in two.get("directions", ())}
     for d in one.get("directions", ()):
         if (other := angles.get(d["direction"])) is not None:
@@ -153,6 +163,7 @@ def _by_intervals(name: str, title: str, before: Estimate, after: Estimate) -> I
 def _rates(
     name: str,
     title: str,
+    figure: Figure,
     one: Rate,
     two: Rate,
     a: Results,
@@ -162,24 +173,31 @@ def _rates(
     *,
     part: str | None = None,
 ) -> Iterator[Change]:
-    """A recovered rate: in pairs if both played the same trials, else by intervals."""
+    """The rate of recovered trials, or of those without a fall: in pairs if both played the same
+    trials, else by intervals; none where an older result does not have it."""
+    before, after = figure.value(one), figure.value(two)
+    if before is None or after is None:
+        return
+    which = 1 if figure is NOT_FALLEN else 0
     required = {"factor": factor, "level": level, "part": part}
     others = _outcomes(b, name)
     pairs = [
-        (record.recovered, others[record.met])
+        ((record.recovered, record.upright)[which], others[record.met][which])
         for record in a.of(name)
         if record.met in others
+        and record.met_by_all
         and all(value is None or record.line[key] == value for key, value in required.items())
     ]
     found = counted(pairs)
     ends = None if found is None else both_ends(found["rate_gain_ci95"])
     if found is None or ends is None or not len(pairs) == one["trials"] == two["trials"]:
-        estimates = ((r["recovered_rate"], r["recovered_ci95"]) for r in (one, two))
-        yield from _by_intervals(name, title, *estimates)
+        intervals = figure.interval(one), figure.interval(two)
+        if intervals[0] is not None and intervals[1] is not None:
+            pair = (before, intervals[0]), (after, intervals[1])
+            yield from _by_intervals(name, title, *pair)
         return
     note = f"{found['only_a']} lost, {found['only_b']} won, p = {found['p_mcnemar']:.2g}"
-    rates = one["recovered_rate"], two["recovered_rate"]
-    yield Change(name, title, *rates, found["rate_gain"], *ends, note)
+    yield Change(name, title, before, after, found["rate_gain"], *ends, note)
 
 
 def _levels(one: Entry, two: Entry) -> Iterator[tuple[tuple[str, str], Level, Level]]:

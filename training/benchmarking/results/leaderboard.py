@@ -7,7 +7,7 @@ from typing import Final
 
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
-from poise.configs.reading import is_folder
+from poise.configs.reading import is_file, is_folder
 from poise.configs.texts import code, plain
 from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_cells
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
@@ -20,15 +20,17 @@ from poise.training.running.columns import (
     J50_MEAN,
     J50_PER_MASS,
     NONE,
+    NOT_FALLEN,
     RECOVERED,
     ROOT,
     TICK,
     known,
 )
-from poise.training.running.files import SUMMARY
+from poise.training.running.files import SETTINGS, SUMMARY, TRIALS
 from poise.training.running.summary import Entry, Summary
 
 from .pages import Table, check_alike, direction_table, page_of
+from .read import load_results
 from .scenario_page import is_of_scenarios, scenario_page
 from .summary import read_summary
 from .walking_leaderboard import is_of_walks, walking_leaderboard
@@ -36,7 +38,7 @@ from .walking_leaderboard import is_of_walks, walking_leaderboard
 PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard.md")
 SCENARIO_PAGE = Path("docs/scenarios.md")
 COLUMNS = {"recovered of the mix", *IN_PAIRS, *(each.heading for each in (
-    J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, ROOT, TICK))}  # fmt: skip
+    J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, NOT_FALLEN, ROOT, TICK))}  # fmt: skip
 SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
 (ETA,) = (each for each in AIMED if each.key == "eta")
 
@@ -51,9 +53,7 @@ def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = N
     """
     summaries = {}
     for source in sources:
-        path = Path(source)
-        path = path / SUMMARY if is_folder(path) else path
-        summaries[str(source)] = read_summary(path)
+        summaries[str(source)] = _summary(Path(source))
     kinds = {source: (is_of_walks(summary), is_of_scenarios(summary))
              for source, summary in summaries.items()}  # fmt: skip
     walks, scenarios = next(iter(kinds.values()))
@@ -72,6 +72,14 @@ def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = N
         page = Path(page or PAGE)
         write_atomic(page, leaderboard(summaries))
     return page
+
+
+def _summary(path: Path) -> Summary:
+    """Of a file, or of a folder, where older walks are judged again if it has their trials."""
+    if not is_folder(path):
+        return read_summary(path)
+    whole = is_file(path / TRIALS) and is_file(path / SETTINGS)
+    return load_results(path).summary if whole else read_summary(path / SUMMARY)
 
 
 def leaderboard(summaries: Mapping[str, Summary]) -> str:

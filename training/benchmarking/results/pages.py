@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from poise.configs.errors import ConfigError
 from poise.configs.texts import code, markdown_page, markdown_table
+from poise.envs.physics.engines.config import MUJOCO
 from poise.training.running.columns import NONE, Figure
 from poise.training.running.summary import Entry, Summary
 
@@ -19,11 +20,16 @@ def page_of(template: str, **values: object) -> str:
 def check_alike(
     summaries: Mapping[str, Summary], shared: Callable[[Summary], Mapping[str, object]]
 ) -> None:
-    """Raise ConfigError for a result that does not share with the first what it is to."""
+    """Raise ConfigError for a result that does not share with the first what it is to, and the
+    engine that stepped the robot."""
+
+    def of(summary: Summary) -> dict[str, object]:
+        return {**shared(summary), "physics": summary.get("physics", MUJOCO)}
+
     first, *_ = summaries
-    wanted = shared(summaries[first])
+    wanted = of(summaries[first])
     for source, summary in summaries.items():
-        for field, value in shared(summary).items():
+        for field, value in of(summary).items():
             if value != wanted[field]:
                 raise ConfigError(f"is not that of {first}", source=source, field=field)
 

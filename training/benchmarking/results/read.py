@@ -11,14 +11,18 @@ from poise.configs.reading import is_file, is_folder, read_table
 from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
 from poise.training.benchmarking.diagnosis.words import diagnosis_of, why
 from poise.training.benchmarking.evaluation.folder import Settings, read_settings
+from poise.training.benchmarking.metrics.played import WALK_PUSH
 from poise.training.benchmarking.trials.table import CASE_COLUMNS, COLUMNS, read_trial
 from poise.training.benchmarking.trials.trial import Trial
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
 from poise.training.running.summary import Summary
 
+from .judged_again import judged_again
 from .summary import read_summary
 
-LATER = (*DIAGNOSIS_COLUMNS, "until")  # columns that older results lack
+#: columns that older results lack
+LATER = (*DIAGNOSIS_COLUMNS, "until", "own_speed_error", "own_turn_error", "last_speed_error",
+         "last_turn_error")  # fmt: skip
 FLAGS = {"True": True, "False": False}
 
 
@@ -49,6 +53,26 @@ class Record:
     def error(self) -> str:
         """The error that the controller raised, or nothing."""
         return self.line["error"]
+
+    @property
+    def upright(self) -> bool:
+        """Not fallen, and the controller has not raised."""
+        return not self.fallen and not self.error
+
+    @property
+    def won(self) -> bool:
+        """What J50, rankings and pairs count, see `training/benchmarking/trials/trial.py`."""
+        return self.upright if self.judged_by_falls else self.recovered
+
+    @property
+    def judged_by_falls(self) -> bool:
+        """Whether it is a walk on level ground, see `Trial.judged_by_falls`."""
+        return bool(self.line.get("commands")) and not self.line.get("terrain")
+
+    @property
+    def met_by_all(self) -> bool:
+        """Whether it is not one of the second stage of pushed walks."""
+        return self.part != WALK_PUSH or self.line["stage"] == "1"
 
     @cached_property
     def met(self) -> tuple[str, ...]:
@@ -104,6 +128,7 @@ def load_results(folder: str | Path) -> Results:
     """Read the folder of a finished result of `evaluate` or `benchmark`.
 
     Where controllers are being added, or this was stopped, it is that of those that are finished.
+    Walks of an older result are judged again, see `judged_again`.
 
     Raises:
         ConfigError: no folder, no finished result, one of another format, or files that are cut
@@ -121,6 +146,7 @@ def load_results(folder: str | Path) -> Results:
     added = settings.controllers.keys() - summary["controllers"].keys()  # not yet finished
     records = tuple(r for r in _records(folder / TRIALS) if r.controller not in added)
     _check(folder, settings, summary, records)
+    summary = judged_again(folder, settings, summary, [record.line for record in records])
     marks = {name: mark for name, mark in settings.controllers.items() if name not in added}
     return Results(folder, replace(settings, controllers=marks), summary, records)
 

@@ -18,10 +18,11 @@ from poise.training.running.columns import (
     STEPS,
 )
 from poise.training.running.summary import Entry, Summary
-from poise.training.running.trial_figures import WalkLevel
+from poise.training.running.trial_figures import NOT_FALLEN, WalkLevel
 
 from .pages import Table, check_alike, direction_table, page_of
 
+OF_J50 = ("j50", "j90", "eta", "directions")  # how the keys of J50's figures begin
 UNPUSHED, PUSHED = "walk", "walk_push"
 
 
@@ -47,17 +48,21 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
     for source, summary in summaries.items():
         entries |= summary["controllers"]
         origin |= dict.fromkeys(summary["controllers"], source)
+    entries = _by_one_verdict(entries)
     commands = [level["level"] for level in _levels(next(iter(entries.values())), UNPUSHED)]
     for name, entry in entries.items():
         if not commands or [each["level"] for each in _levels(entry, UNPUSHED)] != commands:
             raise ConfigError(f"has no walks of the commands of {first}", source=origin[name],
                               field=f"controllers.{name}")  # fmt: skip
     names = sorted(entries, key=lambda name: _order(entries[name]))
+    older = [name for name in names if entries[name].get("criterion") != NOT_FALLEN]
     return page_of(
         "walks.md.j2",
         source=" ".join(summaries),
         first=summaries[first],
         j50=_pushed(entries),
+        older=older if len(older) < len(names) else [],
+        by_falls=len(older) < len(names),
         ranking=_ranking(entries, names),
         commands={command: _walks(entries, names, command) for command in commands},
         heading=J50.heading,
@@ -93,9 +98,23 @@ def _order(entry: Entry) -> tuple[bool, bool, float]:
     return assisted(entry), j50 is None, -(j50 or 0.0)
 
 
+def _by_one_verdict(entries: Mapping[str, Entry]) -> dict[str, Entry]:
+    """The entries without the J50 of older results that count walks off their command as lost,
+    where others count falls: the two do not compare."""
+    older = {name for name, entry in entries.items() if entry.get("criterion") != NOT_FALLEN}
+    if len(older) == len(entries):
+        return dict(entries)
+    kept: dict[str, Entry] = {}
+    for name, entry in entries.items():
+        keys = [key for key in entry if name not in older or not key.startswith(OF_J50)]
+        kept[name] = {key: entry[key] for key in keys}  # type: ignore[assignment,literal-required]
+    return kept
+
+
 def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
     head = ["", "controller", J50_MEAN.heading, J50_PER_MASS.unit, "worst direction",
-            "pushes recovered", "fell unpushed", "falls a minute", "as told, unpushed"]  # fmt: skip
+            "not fallen, pushed", "as commanded again", "fell unpushed", "falls a minute",
+            "as commanded, unpushed"]  # fmt: skip
     rank, rows = places(entries, ("j50_mean", ".1f")), []
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
@@ -104,7 +123,7 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
         low, high = poisson_interval(fallen)
         rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
                 if minutes else NONE)  # fmt: skip
-        rows.append([str(rank[name] or NONE), code(name), *_j50(entry), _pushes(entry),
+        rows.append([str(rank[name] or NONE), code(name), *_j50(entry), *_pushes(entry),
                      f"{fallen} of {trials}", rate, f"{told} of {trials}"])  # fmt: skip
     return head, rows
 
@@ -120,11 +139,14 @@ def _j50(entry: Entry) -> tuple[str, str, str]:
     )
 
 
-def _pushes(entry: Entry) -> str:
+def _pushes(entry: Entry) -> tuple[str, str]:
+    """How many pushed walks stayed upright, and how many went on as commanded."""
     levels = _levels(entry, PUSHED)
     if not levels:
-        return NONE
-    return f"{sum(w['recovered'] for w in levels)} of {sum(w['trials'] for w in levels)}"
+        return NONE, NONE
+    trials = sum(w["trials"] for w in levels)
+    upright = sum(round(w["never_fell_rate"] * w["trials"]) for w in levels)
+    return f"{upright} of {trials}", f"{sum(w['recovered'] for w in levels)} of {trials}"
 
 
 #: of a command; a page has room for two digits of steps

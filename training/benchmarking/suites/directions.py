@@ -1,13 +1,13 @@
 """Parts that ask the same of every direction: the envelope of J50, the grid, and margins."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import ClassVar, Literal, Self
 
 from poise.envs.physics.pushes.options import to_impulse
 from poise.envs.physics.pushes.sampler import Range
-from poise.training.benchmarking.statistics.fits import fit_logistic
+from poise.training.benchmarking.statistics.fits import LogisticFit, fit_logistic
 from poise.training.benchmarking.trials.trial import Trial
 
 from .draw import MOST_TRIALS, Draw, Part, Recovered, repeated
@@ -21,6 +21,10 @@ class Envelope(Part):
     parts. Its fit gives each controller's rough J50; the second stage spreads `trials` more over
     J50 · (1 ± spread). A controller plays its own, so that its trials do not depend on who else
     takes part; `paired`, all controllers play those of all, so that they can be compared in pairs.
+
+    With `reach`, the second stage of a controller whose J50 in a direction is only a lower bound
+    after the first goes on from (1 − spread) times that bound up to `reach`, with one trial at it:
+    who recovers from all has then met the largest impulse of all.
     """
 
     directions: int = field(default=16, metadata={"min": 1, "max": 3600})  # evenly around
@@ -30,11 +34,15 @@ class Envelope(Part):
     trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})  # the same, second
     spread: float = field(default=0.3, metadata={"above": 0.0, "max": 1.0})
     paired: bool = False
+    #: largest impulse of the second stage [N·s/kg]; None: J50 · (1 + spread)
+    reach: float | None = field(default=None, metadata={"above": 0.0, "omit": "default"})
 
     def __post_init__(self) -> None:
         for name, pair in (("fractions", self.fractions), ("impulses", self.impulses)):
             if pair is not None and pair[0] >= pair[1]:
                 raise ValueError(f"{name}: {pair} must increase")
+        if self.reach is not None and self.impulses and self.reach <= self.impulses[1]:
+            raise ValueError(f"reach: must be above impulses, {self.impulses[1]:g}")
 
     def capped(self, trials: int) -> Self:
         most = replace(self, first_trials=max(min(self.first_trials, trials), 2))
@@ -54,8 +62,7 @@ class Envelope(Part):
         def around(names: Iterable[str]) -> list[Trial]:
             rough = ((angle, self.rough(first, recovered[name], angle))
                      for angle in self.angles for name in names)  # fmt: skip
-            ranges = ((angle, (1.0 - self.spread) * j50, (1.0 + self.spread) * j50, self.trials)
-                      for angle, j50 in rough)  # fmt: skip
+            ranges = (each for angle, fit in rough for each in self._around(draw, angle, fit))
             return draw.spread(number, ranges, stage=2)
 
         if self.paired:
@@ -76,12 +83,23 @@ class Envelope(Part):
             low, high = (fraction * limit for fraction in self.fractions)
         return low, high
 
-    def rough(self, first: Sequence[Trial], recovered: Sequence[bool], angle: float) -> float:
-        """J50 [N·s] by the first stage."""
-        here = [(trial.pushes[0].impulse, won) for trial, won in zip(first, recovered, strict=True)
+    def _around(
+        self, draw: Draw, angle: float, fit: LogisticFit
+    ) -> Iterator[tuple[float, float, float, int]]:
+        """Direction, least and largest impulse [N·s] and trials of the second stage."""
+        low, high = (1.0 - self.spread) * fit.j50, (1.0 + self.spread) * fit.j50
+        if self.reach is None or fit.bound != "lower":
+            yield angle, low, high, self.trials
+            return
+        high = max(high, draw.robot.mass * self.reach)
+        yield angle, low, high, self.trials - 1
+        yield angle, high, high, 1
+
+    def rough(self, first: Sequence[Trial], won: Sequence[bool], angle: float) -> LogisticFit:
+        """The fit of J50 [N·s] to the first stage."""
+        here = [(trial.pushes[0].impulse, each) for trial, each in zip(first, won, strict=True)
                 if trial.pushes[0].direction == angle]  # fmt: skip
-        impulse, won = zip(*here, strict=True)
-        return fit_logistic(impulse, won).j50
+        return fit_logistic(*zip(*here, strict=True))
 
 
 @dataclass(frozen=True)

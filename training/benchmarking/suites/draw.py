@@ -10,6 +10,7 @@ import numpy as np
 
 from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.balance.config import StartNoise
+from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.physics.pushes.options import check_body
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.physics.pushes.sampler import Range, push_bodies
@@ -35,7 +36,10 @@ class Standard:
     push_duration: float = field(default=0.1, metadata={"above": 0.0})  # [s]
     interval: float = field(default=1.0, metadata={"above": 0.0})  # between repeated pushes [s]
     body: str | None = None  # the robot's first push body
+    # time after a fall in which the robot may get up again [s]; 0: a fall ends the trial
+    get_up_time: float = field(default=0.0, metadata={"min": 0.0, "max": 1e3, "omit": "default"})
     realism: str = field(default=IDEAL, metadata={"omit": "default"})  # a level or a file of one
+    physics: str = field(default=MUJOCO, metadata={"omit": "default"})  # an engine, or its file
     noise: StartNoise = field(default_factory=StartNoise)
 
 
@@ -51,6 +55,7 @@ class Marks(TypedDict, total=False):
     terrain: Terrain | None
     motion: str | None
     share: float | None
+    start: int | None
 
 
 class Draw:

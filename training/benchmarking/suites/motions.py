@@ -94,7 +94,9 @@ class Motions(Part):
         """J50 [N·s] of a controller that stands, by direction."""
         if draw.limits.controller == name:
             return draw.limits.j50()
-        rough = [self._standing.rough(first, recovered, angle) for angle in self._standing.angles]
+        rough = [
+            self._standing.rough(first, recovered, angle).j50 for angle in self._standing.angles
+        ]
         return LimitTable(tuple(self._standing.angles), tuple(rough))
 
     def _cells(self, draw: Draw, number: int, j50: LimitTable, stage: int = 1) -> list[Trial]:

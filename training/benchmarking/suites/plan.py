@@ -8,7 +8,7 @@ from typing import NamedTuple
 from poise.envs.sensing.drawn import check_limbs
 from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.push_limits import PushLimits
-from poise.training.benchmarking.trials.trial import Outcome, Trial
+from poise.training.benchmarking.trials.trial import Outcome, Trial, won
 
 from .draw import Draw, Part
 from .factors import standard_levels
@@ -87,9 +87,12 @@ class Plan:
         A scenario's own level has the last word in the suite's.
         """
         real = self.suite.realism if level is None else level
-        found = []
+        wait, found = self.suite.get_up_time, []
         for trial in trials:
             own = at = trial.conditions.realism
+            if wait and trial.start is None:
+                until = trial.until or self.suite.duration
+                trial = replace(trial, until=until, get_up=wait)
             part = trial.part or name
             if real != IDEAL and (own is None or level is not None):
                 at = real
@@ -111,7 +114,7 @@ class Plan:
         for key, part, level, first, number, shift in self._parts:
             recovered = {
                 name: [
-                    finished[name, trial.number].recovered
+                    won(trial, finished[name, trial.number])
                     for trial in first
                     if self.plays(name, trial)
                 ]

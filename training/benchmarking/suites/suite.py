@@ -14,6 +14,8 @@ from poise.configs.schema import build, read_yaml
 from .directions import Envelope, Grid, Margin
 from .draw import Part, Standard
 from .factors import Factors, Mix
+from .getting_up import GetUp
+from .lasting import Gusts, Sustained
 from .motions import Motions
 from .random import Quiet, Random, Sequence
 from .scenarios import Scenarios
@@ -36,6 +38,8 @@ class Suite(Standard):
     random: Random | None = None
     sequence: Sequence | None = None
     quiet: Quiet | None = None
+    sustained: Sustained | None = field(default=None, metadata={"omit": "default"})
+    gusts: Gusts | None = field(default=None, metadata={"omit": "default"})
     walk: Walk | None = field(default=None, metadata={"omit": "default"})
     gait: Gait | None = field(default=None, metadata={"omit": "default"})
     velocity: Velocity | None = field(default=None, metadata={"omit": "default"})
@@ -45,6 +49,7 @@ class Suite(Standard):
     terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
     motions: Motions | None = field(default=None, metadata={"omit": "default"})
     scenarios: Scenarios | None = field(default=None, metadata={"omit": "default"})
+    get_up: GetUp | None = field(default=None, metadata={"omit": "default"})
     levels: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
 
     def __post_init__(self) -> None:
@@ -77,7 +82,8 @@ class Suite(Standard):
     @property
     def walks(self) -> bool:
         """True if it is for controllers that walk alone."""
-        return any(name in WALKING for name in self.parts)
+        commanded = (getattr(part, "command", None) for part in (self.sustained, self.gusts))
+        return any(name in WALKING for name in self.parts) or any(commanded)
 
     def performing(self, names: Many[str]) -> Suite:
         """The suite with other motions; raises ConfigError where none is performed."""

@@ -116,7 +116,10 @@ class Walking:
 
 @dataclass(frozen=True)
 class WalkPush(Walking, Envelope):
-    """J50 in each of many directions while it walks, as an `Envelope` finds it, at all phases."""
+    """J50 in each of many directions while it walks, as an `Envelope` finds it, at all phases.
+
+    What counts is not to fall, see `Trial.judged_by_falls`.
+    """
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         return self.walking(draw, super().first(draw, number))
@@ -130,25 +133,36 @@ class WalkPush(Walking, Envelope):
 
 @dataclass(frozen=True)
 class WalkKick(Walking, Part):
-    """Kicks of the root while it walks: in each axis of the ground up to ± one of `speeds`."""
+    """Kicks of the root while it walks: by each of `sizes` in a random direction, and in each axis
+    of the ground up to ± one of `speeds`."""
 
     speeds: tuple[float, ...] = field(default=(0.5, 1.0), metadata={"above": 0.0})  # [m/s]
     trials: int = field(default=400, metadata={"min": 1, "max": MOST_TRIALS})  # of each
+    #: changes of speed [m/s]
+    sizes: tuple[float, ...] = field(default=(), metadata={"above": 0.0, "omit": "default"})
 
     def __post_init__(self) -> None:
-        if not self.speeds:
-            raise ValueError("speeds: must not be empty")
+        if not self.speeds and not self.sizes:
+            raise ValueError("speeds: must not be empty where there are no sizes")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        each = repeated(self.speeds, self.trials, number)
-        return [self._trial(draw, k, speed) for k, speed in each]
+        kinds = [*((size, True) for size in self.sizes), *((speed, False) for speed in self.speeds)]
+        return [
+            self._trial(draw, k, size, fixed)
+            for k, (size, fixed) in repeated(kinds, self.trials, number)
+        ]
 
-    def _trial(self, draw: Draw, number: int, speed: float) -> Trial:
-        x, y = generator(draw.seed, number).uniform(-speed, speed, 2)
-        way = float(np.degrees(np.arctan2(y, x)))
-        kick = Kick(self.begins(draw, number), float(np.hypot(x, y)), way)
+    def _trial(self, draw: Draw, number: int, size: float, fixed: bool) -> Trial:
+        rng = generator(draw.seed, number)
+        if fixed:
+            delta_v, way, level = size, float(rng.uniform(-180.0, 180.0)), f"{size:g} m/s"
+        else:
+            x, y = rng.uniform(-size, size, 2)
+            delta_v, way = float(np.hypot(x, y)), float(np.degrees(np.arctan2(y, x)))
+            level = f"± {size:g} m/s"
+        kick = Kick(self.begins(draw, number), delta_v, way)
         commands = (from_start(self.command),)
-        return draw.trial(number, level=f"± {speed:g} m/s", commands=commands, kicks=(kick,))
+        return draw.trial(number, level=level, commands=commands, kicks=(kick,))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Agents are evaluated: a controller by its name, ready to act in its own environment."""
 
+import contextlib
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.allowance import is_plugin
+from poise.baselines.allowance import is_plugin, noting
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.guard.config import (
     GuardConfig,
@@ -34,7 +35,7 @@ from poise.baselines.registry import (
 from poise.baselines.walking.config import WalkConfig
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.simbicon import SimbiconConfig
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.configs.files import packaged
 from poise.configs.reading import is_folder
 from poise.configs.schema import to_dict, to_yaml
@@ -89,6 +90,26 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     return _idle(name, env, to_yaml(_wherever(config)) + _stand_in(config))
 
 
+def code_of(name: str) -> list[str]:
+    """Return what a command must allow by ``--allow`` to load the agent of this name.
+
+    That is the class from outside or the file of TorchScript that the name, or the file or the
+    folder of this name, leads to. Nothing runs that is not allowed here.
+    """
+    if is_plugin(name):
+        return [name]
+    with noting() as code, contextlib.suppress(PoiseError):
+        if is_guard(name):
+            walker_config(guard_config(name), name)
+        elif is_folder(name) and not is_policy(name):
+            from poise.training.learning.policy import load_policy
+
+            load_policy(name)
+        elif name != NO_CONTROL and name not in packaged("policies"):
+            controller_config(name)
+    return code
+
+
 def check_walks(name: str, agent: Agent, source: str) -> None:
     """Raise ConfigError unless the controller of an agent walks; `source` is what asks for it."""
     if not can_walk(agent):
@@ -138,7 +159,9 @@ def _stand_in(config: ControllerConfig) -> str:
 def _wherever(config: ControllerConfig) -> ControllerConfig:
     """The same for a policy's files in any folder: their digest tells them apart."""
     if isinstance(config, PolicyFileConfig):
-        return replace(config, policy=Path(config.policy).name, described_in="", origin=None)
+        return replace(
+            config, policy=Path(config.policy).name, described_in="", said=(), origin=None
+        )
     return config
 
 

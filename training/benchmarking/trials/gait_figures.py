@@ -1,7 +1,6 @@
 """The figures of a walk: its speed against the command, its steps, what it costs."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +13,21 @@ from .gait_record import WalkArrays, step_error, steps_of
 
 AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
-SPEED_TOLERANCE, YAW_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad] of a walk that has recovered
+SPEED_TOLERANCE, TURN_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad/s] beyond its own error
 FALLING = 1.0  # [s] before a fall, in which strides tell of the fall
 STOPPED = 1.0  # [s] without a touchdown, after which a robot does not walk any more
 SLOW = 0.1  # [m/s] below which a cost of transport says nothing
 WINDOW = 4  # steps, two strides, by which the end of a walk is judged
+
+
+class TrackingError(NamedTuple):
+    """The distance of a walk's velocity from its command."""
+
+    speed: float  # of ahead and left together [m/s]
+    turn: float  # of the turn rate [rad/s]
+
+
+NO_ERROR = TrackingError(0.0, 0.0)
 
 
 class Touchdowns(NamedTuple):
@@ -100,32 +109,51 @@ class Walk:
         """The start of the command that holds at a time [s]."""
         return max((each.start for each in self.commands if each.start <= time + 1e-9), default=0.0)
 
-    def turned(self, first: float, last: float) -> float:
-        """The turn that is commanded from one time to another [rad]."""
-        changes = [each.start for each in self.commands if first < each.start < last]
-        times = [first, *changes, last]
-        return sum((b - a) * self.command_at(a).turn for a, b in pairwise(times))
+    def own_error(self, until: float | None = None) -> TrackingError | None:
+        """The tracking error of the walk itself: the largest over its settled strides i that end
+        before `until` [s] and follow the last command,
 
-    def as_commanded(self, pushed: float | None = None) -> bool:
-        """Whether the last two strides follow the command: within 0.05 m/s and 5°.
+            e_v = max_i |v_i − v*|,   e_ω = max_i |ω_i − ω*|
 
-        Four steps between touchdowns, the last one in the last second; their mean velocity along
-        their mean heading is compared with the command. Their heading is compared with that of the
-        two strides before the first push, at `pushed` [s], or, without one, before themselves; by
-        then it should have turned as commanded.
+        v_i and v* the mean velocity of stride i along its mean heading, and the command, ω_i and ω*
+        the turn rates. None without such a stride.
+        """
+        last = self.command_at(self.record.time[-1]).array()[:3]
+        own = self.settled & np.all(self.wanted == last, axis=1)
+        if until is not None:
+            own &= self.record.time[self.landed.row[2:]] <= until
+        errors = self.velocity[own] - last
+        if not len(errors):
+            return None
+        speed = float(np.linalg.norm(errors[:, :2], axis=1).max())
+        return TrackingError(speed, float(np.abs(errors[:, 2]).max()))
+
+    def last_error(self) -> TrackingError | None:
+        """The distance of the mean velocity over the last two strides from the command, along their
+        mean heading.
+
+        None where there are no four steps between touchdowns, the last one in the last second: it
+        does not walk any more.
         """
         rows, r = self.landed.row, self.record
-        before = len(rows) - 1 - WINDOW
-        if pushed is not None:
-            before = int(np.sum(r.time[rows] <= pushed)) - 1
-        if len(rows) <= WINDOW or before < WINDOW or r.time[-1] - r.time[rows[-1]] > STOPPED:
-            return False
-        now, then = (rows[-1 - WINDOW], rows[-1]), (rows[before - WINDOW], rows[before])
-        wanted = self.command_at(r.time[-1])
-        off = self.mean_velocity(*now)[:2] - [wanted.ahead, wanted.left]
-        middles = [0.5 * (r.time[a] + r.time[b]) for a, b in (then, now)]
-        turn = self.mean_yaw(*now) - self.mean_yaw(*then) - self.turned(*middles)
-        return bool(np.hypot(*off) <= SPEED_TOLERANCE and abs(turn) <= YAW_TOLERANCE)
+        if len(rows) <= WINDOW or r.time[-1] - r.time[rows[-1]] > STOPPED:
+            return None
+        wanted = self.command_at(r.time[-1]).array()[:3]
+        off = self.mean_velocity(rows[-1 - WINDOW], rows[-1]) - wanted
+        return TrackingError(float(np.hypot(*off[:2])), abs(float(off[2])))
+
+    def as_commanded(self, own: TrackingError = NO_ERROR) -> bool:
+        """Whether the last two strides are as near to the command as the controller's own strides:
+
+            |v − v*| ≤ e_v + 0.05 m/s,   |ω − ω*| ≤ e_ω + 5 °/s
+
+        v and ω as of `last_error`. `own` is (e_v, e_ω) of `own_error`, the strides before a push or
+        those of the same walk without it. A steady error of a controller's own is therefore not
+        charged to the push. Without `own` the walk is compared with the command alone. A heading is
+        not commanded, so none is asked for.
+        """
+        last = self.last_error()
+        return last is not None and near(last, own)
 
     def figures(self) -> dict[str, float | None]:
         """The figures of an `Outcome`, of the strides and steps that are settled."""
@@ -234,6 +262,12 @@ class Walk:
             return None
         part = min((time - last) / step, 1.0 - 1e-9)
         return float(0.5 * part + (0.0 if feet[past - 1] == left else 0.5))
+
+
+def near(last: TrackingError, own: TrackingError) -> bool:
+    """The inequalities of `Walk.as_commanded`."""
+    slow, turned = last.speed - own.speed, last.turn - own.turn
+    return bool(slow <= SPEED_TOLERANCE and turned <= TURN_TOLERANCE)
 
 
 def _mean(values: np.ndarray) -> float | None:

@@ -9,6 +9,7 @@ from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.tempo import Tempo
 from poise.envs.balance.config import StartNoise
+from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.motion.tracking.record import ANYWHERE
 
@@ -29,11 +30,18 @@ class Stage:
     #: these then
     motions: tuple[tuple[str, str], ...] = ()
     tempo: Tempo = field(default_factory=Tempo)  #: at which they are played
+    #: time after a fall in which the robot may get up [s]; None: a fall ends the trial
+    get_up: float | None = None
+    physics: str = MUJOCO  #: engine that steps the robot, by its name or file
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
-        given: dict[str, Any] = {"duration": self.duration, "pushes": None, "noise": self.noise}
+        duration = self.duration + (self.get_up or 0.0)
+        given: dict[str, Any] = {"duration": duration, "pushes": None, "noise": self.noise,
+                                 "physics": self.physics}  # fmt: skip
+        if self.get_up is not None:
+            given["fall"] = {"terminates": False}
         if self.motions:
             given["fall"] = ANYWHERE
         if self.tempo.waits:

@@ -6,6 +6,7 @@ from pathlib import Path
 from poise.baselines.allowance import is_plugin, is_script
 from poise.baselines.policy_files.known import GUARDS, RIVALS
 from poise.baselines.policy_files.reading import advice, is_policy
+from poise.baselines.policy_files.refused import check_not_refused
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder
@@ -22,11 +23,12 @@ def check_names(
     suite: str | None = None,
     motion: str | None = None,
     realism: str | None = None,
+    physics: str | None = None,
 ) -> None:
     """Raise ConfigError, which lists what there is, for a name of nothing; see `check_name`."""
     if motion is not None and Path(motion).suffix == ".npz":  # a robot's motion
         motion = None
-    given = {"robots": robot, "suites": suite, "motions": motion}
+    given = {"robots": robot, "suites": suite, "motions": motion, "physics": physics}
     for kind, name in given.items():
         if name is not None:
             resolve(kind, name)
@@ -48,6 +50,7 @@ def check_name(name: str) -> None:
                           source=name, field="controller")  # fmt: skip
     of_file = is_file(name) and Path(name).suffix in (".yaml", ".yml")
     if not (name in names or of_file or is_folder(name) or is_policy(name) or is_plugin(name)):
+        check_not_refused(name)
         raise ConfigError(
             f"no such controller: {shown(name)}{meant(name, names) or ';'} give a name, a .yaml "
             "file of a controller, a folder written by poise train, an ONNX file or a folder with "

@@ -15,13 +15,14 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Kick, Push
-from poise.training.benchmarking.diagnosis.diagnosis import diagnose
-from poise.training.benchmarking.diagnosis.record import CourseRecord
+from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis, diagnose
+from poise.training.benchmarking.diagnosis.record import CourseRecord, swing_of
 from poise.training.motion.tracking.record import Tracking
 
 from .agents import Agent
-from .gait_figures import AIR_TIME, Walk
+from .gait_figures import AIR_TIME, NO_ERROR, TrackingError, Walk, near
 from .gait_record import WalkRecord
+from .rising import Rise, Rising
 from .signals import Sway
 from .trial import Outcome, Trial
 
@@ -40,7 +41,7 @@ class SteppedTrial:
     """
 
     def __init__(self, agent: Agent, trial: Trial):
-        self._agent, self.done, env = agent, False, agent.env
+        self._agent, self._trial, self.done, env = agent, trial, False, agent.env
         until, period = trial.until, env.config.policy_period
         self._steps = env.max_steps if until is None else round(until / period)
         self._observation, _ = env.reset(seed=trial.seed, options=trial.options)
@@ -56,15 +57,28 @@ class SteppedTrial:
         _, terminated, truncated = env.step_without_info(action)
         self._observation = env.episode.observation.astype(np.float32)
         self.done = terminated or truncated or env.steps >= self._steps
+        self.done |= env.fallen and self._trial.start is None
         if self.tracking is not None:
             self.tracking.update()
             self.done |= self.tracking.ended
         return action
 
+    def rise(self, duration: float) -> Rise:
+        """Go on for `duration` [s] with a robot that is down, at most until it is up again."""
+        env, rising = self._agent.env, Rising(self._agent.env)
+        for _ in range(round(duration / env.config.policy_period)):
+            if not env.episode.running[0] or rising.held:
+                break
+            self.step()
+            rising.update()
+        return rising.outcome()
+
 
 def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
     """Play a trial to its end in the environment that the agent has."""
     env, stepped = agent.env, SteppedTrial(agent, trial)
+    if trial.start is not None:
+        return rise_trial(env, trial, stepped, watch)
     settled, course = Settled(), CourseRecord()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
     stands = not trial.commands and stepped.tracking is None
@@ -75,13 +89,15 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
         for each in watches:
             each(env)
         action = stepped.step()
-        touchdowns.update(env.simulation.state.contacts)
+        touchdowns.update(env.simulation.state.contacts, swing_of(env))
         settled.update(env, action)
     for each in watches:
         each(env)
     outcome, loss = _outcome(env, trial, settled, touchdowns.count), "not quiet"
     if walk is not None:
         outcome, loss = walked(env, trial, outcome, walk), "off command"
+        if left_command(trial, outcome) and outcome.own_speed_error is None:
+            return against_unpushed(agent, trial, explained(env, trial, outcome, course, loss))
     elif stepped.tracking is not None:
         outcome, loss = followed(env, outcome, stepped.tracking), "motion"
     elif sway is not None and outcome.recovered:
@@ -89,8 +105,45 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
         outcome = replace(outcome, sway=body, sway_recovery=recovery)
     if outcome.recovered:
         return outcome
+    outcome = explained(env, trial, outcome, course, loss)
+    if trial.get_up and env.fallen and env.episode.running[0]:
+        return replace(outcome, **asdict(stepped.rise(trial.get_up)))
+    return outcome
+
+
+def explained(
+    env: BalanceEnv, trial: Trial, outcome: Outcome, course: CourseRecord, loss: str
+) -> Outcome:
+    """The outcome of a lost trial with its diagnosis; `loss` is the criterion without a fall."""
+    start = first_start(trial) or 0.0
+    return replace(outcome, **asdict(diagnose(env, course.course(), start, loss)))
+
+
+def rise_trial(
+    env: BalanceEnv, trial: Trial, stepped: SteppedTrial, watch: Watch | None
+) -> Outcome:
+    """The outcome of a trial that starts on the ground: `recovered` is to be up at its end."""
+    rising, settled = Rising(env), Settled()
+    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    while not stepped.done:
+        if watch is not None:
+            watch(env)
+        action = stepped.step()
+        rising.update()
+        touchdowns.update(env.simulation.state.contacts)
+        settled.update(env, action)
+    if watch is not None:
+        watch(env)
+    rise = rising.outcome()
+    outcome = _outcome(env, trial, settled, touchdowns.count)
     return replace(
-        outcome, **asdict(diagnose(env, course.course(), first_start(trial) or 0.0, loss))
+        outcome,
+        **asdict(rise),
+        recovered=rise.up_again,
+        loss=None if rise.up_again else "down",
+        recovery_time=None,
+        com_drift=None,
+        foot_drift=None,
     )
 
 
@@ -104,8 +157,8 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     """The outcome of a trial with commands, with the figures of its walk.
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
-    (`Walk.as_commanded`), on a terrain to be beyond its last edge; there is no time of recovery
-    then, and no drift.
+    again, as near to the command as before the push (`Walk.as_commanded`), on a terrain to be
+    beyond its last edge; there is no time of recovery then, and no drift.
     """
     assert isinstance(env, CommandedEnv)  # it has taken the commands
     walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
@@ -130,8 +183,43 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
         last, passed = len(terrain.surfaces()) - 1, outcome.surfaces_passed
         outcome = replace(outcome, recovered=not env.fallen and passed == last)
     elif trial.commands[-1].array()[:3].any():
-        recovered = not env.fallen and walk.as_commanded(first)
-        outcome = replace(outcome, recovered=recovered)
+        own = None if first is None else walk.own_error(first)
+        end = None if env.fallen else walk.last_error()
+        recovered = end is not None and near(end, own or NO_ERROR)
+        outcome = replace(outcome, recovered=recovered, **_errors("own", own),
+                          **_errors("last", end))  # fmt: skip
+    return outcome
+
+
+def _errors(whose: str, error: TrackingError | None) -> dict[str, Any]:
+    """The figures of an outcome that say how far a walk is from its command."""
+    speed, turn = (None, None) if error is None else map(_finite, error)
+    return {f"{whose}_speed_error": speed, f"{whose}_turn_error": turn}
+
+
+def left_command(trial: Trial, outcome: Outcome) -> bool:
+    """Whether a walk was pushed, did not fall, and goes on otherwise than commanded."""
+    pushed = first_start(trial) is not None
+    return pushed and outcome.last_speed_error is not None and not outcome.recovered
+
+
+def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
+    """The outcome of a walk that had no settled stride before its push: it is compared with the
+    same trial without the push, which is played for that.
+    """
+    assert outcome.last_speed_error is not None and outcome.last_turn_error is not None
+    last = TrackingError(outcome.last_speed_error, outcome.last_turn_error)
+    env, record = agent.env, WalkRecord()
+    stepped = SteppedTrial(agent, replace(trial, pushes=(), kicks=()))
+    record(env)
+    while not stepped.done:
+        stepped.step()
+        record(env)
+    fell = env.simulation.time if env.fallen else None
+    own = Walk(record.arrays(), trial.commands, fell).own_error()
+    outcome = replace(outcome, **_errors("own", own))
+    if own is not None and near(last, own):
+        outcome = replace(outcome, recovered=True, **asdict(Diagnosis()))
     return outcome
 
 
@@ -235,6 +323,8 @@ def _finite(value: float) -> float | None:
 class Touchdowns:
     """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
 
+    Where the controller has a plan, those alone that it planned: a foot that it swung meanwhile.
+
     Args:
         feet: number of feet.
         period: seconds between two calls of `update`.
@@ -244,9 +334,13 @@ class Touchdowns:
         self.count = 0
         self._least = max(round(AIR_TIME / period), 1)
         self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
+        self._planned = np.zeros(feet, dtype=bool)  # whether the foot swung by plan in these
 
-    def update(self, contacts: np.ndarray) -> None:
-        """(feet,) 1 where a foot touches the ground, else 0."""
+    def update(self, contacts: np.ndarray, swinging: int | None = None) -> None:
+        """Take (feet,) 1 where a foot touches the ground, else 0, and `swing_of` the controller."""
         down = contacts > 0.5
-        self.count += int(np.sum(down & (self._air >= self._least)))
+        swung = swinging is None or np.arange(len(down)) == swinging
+        self._planned |= ~down & swung
+        self.count += int(np.sum(down & self._planned & (self._air >= self._least)))
+        self._planned &= ~down
         self._air = np.where(down, 0, self._air + 1)

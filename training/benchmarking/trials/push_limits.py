@@ -95,9 +95,13 @@ def load_limits(robot: Robot, name: str | Path | None = None) -> PushLimits:
     path = resolve("limits", name)
     measured = build(MeasuredLimits, read_yaml(path), str(path))
     if measured.fingerprint != robot.fingerprint:
+        ours = robot.name in packaged("robots") and robot.source == str(
+            resolve("robots", robot.name)
+        )
+        typed = robot.name if ours else robot.source
         raise ConfigError(
             f"measured for another robot than {robot.name!r}: measure again with poise evaluate "
-            f"momentum-qp --suite envelope --robot {shlex.quote(robot.name)} "
+            f"momentum-qp --suite envelope --robot {shlex.quote(typed)} "
             f"--write-limits {shlex.quote(str(path))}",
             source=path,
             field="fingerprint",

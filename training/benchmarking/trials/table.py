@@ -1,12 +1,12 @@
 """Trials and outcomes as lines of trials.csv: what is written reads back exactly."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import parse_json
 from poise.configs.schema import build, to_dict
 from poise.envs.physics.pushes.push import Push
@@ -23,15 +23,15 @@ CONDITIONS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
     *(*PUSH_COLUMNS, *CONDITIONS, "limit_fraction", "later", "commands"),
-    *("kicks", "terrain", "motion", "share", "until"),
+    *("kicks", "terrain", "motion", "share", "until", "start_posture", "get_up"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
 )
 COLUMNS = (*CASE_COLUMNS, *OUTCOME_COLUMNS)
 TEXTS = ("controller", "part", "factor", "level", "body", "profile", "realism", "motion")
-WHOLE = ("trial", "seed", "stage")
-FULL = (*WHOLE, "delay", "mass_error")  # columns without empty cells
+WHOLE = ("trial", "seed", "stage", "start_posture")
+FULL = ("trial", "seed", "stage", "delay", "mass_error")  # columns without empty cells
 AS_JSON = ("later", "commands", "kicks", "terrain")  # of all other columns a cell is a number
 
 
@@ -49,6 +49,7 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
         "later": _many(trial.pushes[1:]),
         "commands": _many(trial.commands),
         "kicks": _many(trial.kicks),
+        "start_posture": trial.start,
         "terrain": None if trial.terrain is None else json.dumps(to_dict(trial.terrain)),
     }
     case = {name: cells[name] if name in cells else getattr(trial, name) for name in CASE_COLUMNS}
@@ -63,6 +64,32 @@ def _many(items: Sequence[Any]) -> str | None:
 def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
     """The columns of an outcome."""
     return dict(zip(OUTCOME_COLUMNS, asdict(outcome).values(), strict=True))
+
+
+def read_outcome(line: Mapping[str, str], path: Path) -> Outcome:
+    """The outcome of a line; raises ConfigError where it does not parse. A column that older
+    results lack is a field's default, and so is an empty cell."""
+    cells: dict[str, Any] = {}
+    for column, (name, hint) in zip(OUTCOME_COLUMNS, get_type_hints(Outcome).items(), strict=True):
+        text = line.get(column)
+        if not text:
+            continue
+        try:
+            cells[name] = _FROM_TEXT.get(hint, str)(text)
+        except (ValueError, KeyError):
+            raise ConfigError(f"trial {line['trial']}: {column} does not parse: {shown(text)}",
+                              source=path) from None  # fmt: skip
+    return build(Outcome, cells, f"{path}: trial {line['trial']}")
+
+
+#: type of a field → what reads it; others are texts
+_FROM_TEXT: dict[Any, Callable[[str], Any]] = {
+    bool: {"True": True, "False": False}.__getitem__,
+    int: int,
+    int | None: int,
+    float: float,
+    float | None: float,
+}
 
 
 def _push_cells(push: Push | None) -> dict[str, Cell]:
@@ -89,6 +116,7 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
     except (ValueError, TypeError) as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
     cells["number"] = cells.pop("trial", None)
+    cells["start"] = cells.pop("start_posture", None)
     cells.pop("controller", None)
     source = f"{path}: trial {line['trial']}"
     return build(Trial, {"pushes": pushes, "conditions": conditions, **cells}, source)

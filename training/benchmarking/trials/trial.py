@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from poise.baselines.walking.schedule import TimedCommand
+from poise.configs.errors import raised
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.terrain.terrain import Terrain
 from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis
@@ -47,6 +48,9 @@ class Trial:
     motion: str | None = None
     share: float | None = None  #: of the controller's J50 that the push is
     until: float | None = None  #: when it ends [s]; None: when those of its suite do
+    #: number of the posture on the ground that it starts from; None: it starts on its feet
+    start: int | None = None
+    get_up: float | None = None  #: time after a fall in which the robot may get up again [s]
 
     @property
     def command(self) -> TimedCommand | None:
@@ -59,10 +63,17 @@ class Trial:
         return self.pushes[0] if self.pushes else None
 
     @property
+    def judged_by_falls(self) -> bool:
+        """Whether it is won by not falling: a walk, but for one that is to get across a terrain."""
+        return bool(self.commands) and self.terrain is None
+
+    @property
     def options(self) -> dict[str, Any]:
         """The argument `options` of the environment's `reset`."""
         pushes = {"push": [*self.pushes, *self.kicks]}
-        return {**pushes, "command": list(self.commands)} if self.commands else pushes
+        commands = {"command": list(self.commands)} if self.commands else {}
+        fallen = {} if self.start is None else {"fallen": self.start}
+        return {**pushes, **commands, **fallen}
 
 
 @dataclass(frozen=True)
@@ -75,8 +86,9 @@ class TrialFigures:
     """
 
     #: upright, quiet and with feet at rest for the last second; of a walk that goes on, not fallen,
-    #: and in the last two strides as commanded, see `Walk.as_commanded`; on a terrain, not fallen
-    #: and beyond its last edge; where a motion is performed, not fallen
+    #: and in the last two strides as commanded again, see `Walk.as_commanded`; on a terrain, not
+    #: fallen and beyond its last edge; where a motion is performed, not fallen; from a
+    #: start on the ground, up for the last second
     recovered: bool
     fallen: bool
     fall_time: float | None = None  #: from the reset
@@ -84,7 +96,9 @@ class TrialFigures:
     recovery_time: float | None = None
     #: a foot moved more than 5 cm; the column `stepped` of trials.csv
     foot_displaced: bool = False
-    steps: int = 0  #: touchdowns of feet that were in the air for 0.08 s
+    #: touchdowns of feet that were in the air for 0.08 s; of a controller that plans its steps, or
+    #: keeps its feet where they are, those that it planned
+    steps: int = 0
     max_com: float | None = None  #: largest distance of the CoM from the soles' centre
     max_capture: float | None = None  #: the same of the capture point
     min_cop_margin: float | None = None  #: smallest distance of the CoP from the support's edge
@@ -142,6 +156,13 @@ class TrialFigures:
     #: phase of the stride at the start of the first push or kick: 0 where the left foot lands, 0.5
     #: where the right one does
     push_phase: float | None = None
+    #: largest distance of a stride's velocity from the command before the first push or kick, else
+    #: without it, see `Walk.own_error` [m/s]; of a walk that is pushed
+    own_speed_error: float | None = None
+    own_turn_error: float | None = None  #: the same of the turn rate [rad/s]
+    #: distance of the last two strides' mean velocity from the command [m/s]; None after a fall
+    last_speed_error: float | None = None
+    last_turn_error: float | None = None  #: the same of the turn rate [rad/s]
     edge_contacts: int = 0  #: times that a foot came to touch an edge of the terrain
     #: of a terrain, of which the CoM has passed the beginning; stairs climbed
     surfaces_passed: int | None = None
@@ -157,10 +178,19 @@ class TrialFigures:
     placement_error: float | None = None
     support_slide: float | None = None
     interruptions: float | None = None
+    #: whether a robot that fell, or began on the ground, was up again for a second at the end: the
+    #: root within 30° of standing, the CoM at 0.8 of its height, only the feet on the ground
+    up_again: bool | None = None
+    up_time: float | None = None  #: from the fall, or the start on the ground, until it was up
     #: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`
     drawn: str | None = None
     #: what the controller raised, on one line; the trial then counts as not recovered
     error: str | None = None
+
+    @property
+    def upright(self) -> bool:
+        """Not fallen, and the controller has not raised."""
+        return not self.fallen and self.error is None
 
 
 @dataclass(frozen=True)
@@ -171,7 +201,12 @@ class Outcome(Diagnosis, TrialFigures):
     """
 
 
+def won(trial: Trial, outcome: Outcome) -> bool:
+    """What J50, rankings and pairs count: of a walk on level ground not to have fallen, of all else
+    to have recovered."""
+    return outcome.upright if trial.judged_by_falls else outcome.recovered
+
+
 def failed(error: Exception) -> Outcome:
     """The outcome of a trial in which the controller raised."""
-    text = " ".join(f"{type(error).__name__}: {error}".split())
-    return Outcome(recovered=False, fallen=False, error=text, loss="error")
+    return Outcome(recovered=False, fallen=False, error=raised(error), loss="error")

@@ -96,13 +96,15 @@ def follow(
     video: Path | None = None,
     size: tuple[int, int] = (640, 480),
     allow: Allow = (),
-) -> None:
+) -> int:
     """Perform a motion, pushed or not, and say how near the robot stayed to it.
 
     Args:
         motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
-            motion is made first: a .motion file, the name of a packaged one, or its text.
-        controller: as in poise evaluate.
+            motion is made first: a .motion or .csv file, the name of a packaged one, or its text.
+            For a tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1, or
+            "network" for the one within its network.
+        controller: as in poise evaluate; a policy from outside that tracks motions follows clips.
         starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
             at each tempo of --fastest.
         push: impulse of a push at a random time of the motion [N s]; 0 for none.
@@ -118,16 +120,22 @@ def follow(
             pressure, errors, tempo, and the timeline of a script's motion.
         video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost.
         size: of the video, width and height [pixels], even.
+
+    Returns:
+        0 if no trial fell, 1 if one did.
     """
     from poise.baselines.allowance import allowing
     from poise.training.benchmarking.trials.names import check_names
 
     script = find_script(motion) if names_script(motion) else None
-    check_names([controller], robot=robot, motion=None if script else motion)
+    is_clip = Path(motion).suffix in (".npz", ".csv") or motion == "network"
+    check_names([controller], robot=robot, motion=None if script or is_clip else motion)
     from poise.baselines.balance.references.tempo import Tempo
+    from poise.training.benchmarking.trials.push_limits import load_limits
     from poise.training.motion.following.fastest import STARTS, find_fastest
     from poise.training.motion.following.follow import follow as perform
     from poise.training.motion.following.tables import print_followed
+    from poise.training.motion.following.tracked import follow_clip, following, tracker_config
     from poise.training.pictures.figures.encoder import check_video
     from poise.training.pictures.figures.playback import check_size
     from poise.training.pictures.motion_report.film import Film
@@ -156,9 +164,32 @@ def follow(
             folder = stack.enter_context(TemporaryDirectory(prefix="poise-"))
             motion = str(Path(folder) / f"{Path(script.source).stem}.npz")
             write_motion(synthesis, script, robot, Path(motion))
+        tracker = tracker_config(controller)
+        if tracker is not None:
+            if fastest or waits or tempo != 1.0 or report or video:
+                raise ConfigError("a tracker follows its clip at the clip's own pace: not with "
+                                  "--tempo, --waits, --fastest, --report, --video",
+                                  source=controller, field="controller")  # fmt: skip
+            if push and share:
+                raise ConfigError("give either an impulse or a share of J50", field="share")
+            body = load_robot(robot)
+            half = load_limits(body).j50() if share else None
+
+            def impulse(direction: float) -> float:
+                return push if half is None else share * half(direction)
+
+            tracked = follow_clip(following(tracker, motion), body,
+                                  starts=20 if starts is None else starts, pushed=impulse,
+                                  directions=directions, seed=seed, realism=realism)  # fmt: skip
+            print_followed(tracked, f"{Path(motion).stem} by {controller} on {robot}, {pushed}",
+                           terminal())  # fmt: skip
+            if out is not None:
+                write_atomic(out, json.dumps([asdict(each) for each in tracked], indent=1) + "\n")
+                print(out)
+            return
         if fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
-            return
+            return 0
         watched = Watched() if report is not None else None
         film = None if video is None else stack.enter_context(Film(video, size, watched))
         waits_so = Tempo(waits=True) if waits else None
@@ -176,3 +207,4 @@ def follow(
         print(video)
     if report is not None:
         print(report)
+    return 1 if any(trial.fallen for trial in trials) else 0

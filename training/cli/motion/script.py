@@ -99,7 +99,7 @@ def plan(
     """The cheapest ways of a script through a motion graph, without making the motion.
 
     Args:
-        script: a .motion file, the name of a packaged script, or the script itself.
+        script: a .motion file, a .csv of --table, the name of a packaged script, or its text.
         graph: a file of poise motion graph. None: the packaged clips.
         robot: for whom the packaged clips are retargeted. None: their own skeleton.
         k: how many ways.
@@ -132,7 +132,7 @@ def synth(
     """Make the motion of a script, and a file beside it with every choice (.plan.json).
 
     Args:
-        script: a .motion file, the name of a packaged script, or the script itself.
+        script: a .motion file, a .csv of --table, the name of a packaged script, or its text.
         out: the file to write: .npz for a robot to follow, or .bvh.
         robot: whose motion it becomes. None: that of the clips' own skeleton, as .bvh.
         graph: a file of poise motion graph. None: the packaged clips.

@@ -1,6 +1,7 @@
 """What an exported file says of the policy: whose it is, what it observes, what its actions do.
 
-Words are mjlab's where it has one, see `policy_files/metadata.py`: lists have commas between them.
+Words are mjlab's where it has one, see `policy_files/onnx/metadata.py`: lists have commas between
+them.
 """
 
 import json
@@ -24,7 +25,6 @@ IDS = {
     "whole": "poise/ResidualWhole-v0",
     "torque": "poise/TorqueBalance-v0",
     "position": "poise/PositionBalance-v0",
-    "velocity": "poise/Velocity-v0",
 }
 UNITS = {  # of what an entry of the action moves
     **{"com": "m", "cop": "m", "lean": "rad", "momentum": "m h² ω"},

@@ -4,14 +4,12 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from poise.baselines.allowance import is_script
-from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.known import known_policies
 from poise.baselines.policy_files.networks import onnx_session
+from poise.baselines.policy_files.observations import tracks_motion
 from poise.baselines.policy_files.onnx.files import BYTES, digest, is_network
 from poise.baselines.policy_files.onnx.metadata import metadata_fields
 from poise.baselines.registry import controller_config
@@ -20,18 +18,16 @@ from poise.configs.reading import is_file, read_bytes
 from poise.envs.robots.robot import Robot
 
 from .guess import WORDS, Layout, Sizes, layouts, network_sizes
-from .rollout import Finding, compare, read_rollout
-
-SECONDS = 10.0  # for which it is to stand
-
-
-@dataclass(frozen=True)
-class Stood:
-    """How it stood: when it fell [s] or None, how far it went [m], whether it was at rest."""
-
-    fell: float | None
-    moved: float
-    rests: bool
+from .proposals import (
+    Tried,
+    clock_is_open,
+    order_is_open,
+    steps_missing,
+    try_clocks,
+    try_histories,
+)
+from .rollout import Finding, compare
+from .standing import Stood, stand
 
 
 @dataclass(frozen=True)
@@ -46,6 +42,10 @@ class PolicyCheck:
         unsaid: fields of `WORDS` that nothing says.
         stood: how it stood; None where nothing describes it.
         findings: what a rollout tells.
+        tried: readings of what the description leaves open, where it fell or was never at rest.
+        proposed: the one of them that stood best, better than what is described; or None.
+        held: whether it tracks a motion whose first frame is held.
+        amends: whether the description does not fit the network without the proposal.
     """
 
     file: str
@@ -55,11 +55,15 @@ class PolicyCheck:
     unsaid: tuple[str, ...]
     stood: Stood | None
     findings: tuple[Finding, ...]
+    tried: tuple[Tried, ...] = ()
+    proposed: Tried | None = None
+    amends: bool = False
+    held: bool = False
 
     @property
     def right(self) -> bool:
         """Whether it is described, stands, and nothing of the rollout speaks against it."""
-        stands = self.stood is not None and self.stood.fell is None
+        stands = self.stood is not None and self.stood.fell is None and not self.amends
         return stands and all(each.right is not False for each in self.findings)
 
 
@@ -82,11 +86,28 @@ def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> Policy
     config = controller_config(known or file)
     if not isinstance(config, PolicyFileConfig):
         raise ConfigError("is no policy from outside", source=file, field="policy")
-    policy = PolicyFile(robot, config)
-    findings = () if rollout is None else compare(policy, read_rollout(rollout), rollout)
     sizes = network_sizes(Path(config.policy))
-    return PolicyCheck(file, known, sizes, (), _unsaid(config), stand(robot, config),
-                       tuple(findings))  # fmt: skip
+    steps = steps_missing(robot, config, sizes)
+    tried = try_histories(robot, config, steps) if steps > 1 else []
+    proposed = max(tried, key=lambda each: each.stood.rank, default=None)
+    if proposed is not None:
+        config = proposed.config
+    policy = PolicyFile(robot, config)
+    findings = () if rollout is None else compare(policy, rollout)
+    stood = stand(robot, config)
+    if steps == 1:
+        if stood.fell is not None and order_is_open(config):
+            tried += try_histories(robot, config, 1)
+        if not stood.rests and clock_is_open(config):
+            tried += try_clocks(robot, config)
+        proposed = _better(tried, stood)
+    return PolicyCheck(file, known, sizes, (), _unsaid(config), stood, tuple(findings),
+                       tuple(tried), proposed, steps > 1, _holds(config))  # fmt: skip
+
+
+def _holds(config: PolicyFileConfig) -> bool:
+    """Return whether a policy tracks a motion whose first frame is held."""
+    return tracks_motion(config) and not (config.motion is not None and config.motion.plays)
 
 
 def known_as(path: Path) -> str | None:
@@ -99,15 +120,11 @@ def known_as(path: Path) -> str | None:
     return None
 
 
-def stand(robot: Robot, config: PolicyFileConfig) -> Stood:
-    """Let it stand for ten seconds, nearly undisturbed."""
-    env = ResidualBalanceEnv(robot, controller=config, pushes=None, duration=SECONDS)
-    env.reset(seed=0, options={"push": []})
-    start, rest = env.simulation.state.com.copy(), np.zeros(len(env.action_names))
-    while not env.fallen and env.simulation.time < SECONDS - 1e-9:
-        env.step_without_info(rest)
-    moved = float(np.linalg.norm((env.simulation.state.com - start)[:2]))
-    return Stood(env.simulation.time if env.fallen else None, moved, bool(env.recovered))
+def _better(tried: list[Tried], stood: Stood) -> Tried | None:
+    """The reading that stood best of those that stand where it fell, or rest where it did not."""
+    fell = stood.fell is not None
+    better = [each for each in tried if each.stood.fell is None and (fell or each.stood.rests)]
+    return max(better, key=lambda each: each.stood.rank, default=None)
 
 
 def _said(path: Path) -> dict[str, object]:
@@ -127,11 +144,7 @@ def _layouts(sizes: Sizes, joints: int) -> list[Layout]:
 
 
 def _unsaid(config: PolicyFileConfig) -> tuple[str, ...]:
-    """Fields of `WORDS` that are as they are where nothing says them, which is seldom right."""
-    usual = PolicyFileConfig()
-    named = config.joints or config.motors
-    return tuple(
-        name
-        for name in ("joints", "default", "stiffness", "damping")
-        if getattr(config, name) == getattr(usual, name) and not (name == "joints" and named)
-    )
+    """Fields of `WORDS` that nothing says, though they are seldom as they are by default."""
+    said = {"joints" if name == "motors" else name for name in config.said}
+    open_ones = ("joints", "default", "stiffness", "damping", "action_scale")
+    return tuple(name for name in open_ones if name not in said)

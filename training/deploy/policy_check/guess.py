@@ -7,7 +7,9 @@ from itertools import product
 from pathlib import Path
 
 from poise.baselines.allowance import check_allowed, is_script
-from poise.baselines.policy_files.networks import onnx_session, script_sizes
+from poise.baselines.policy_files.clip_network import JOINTS, TIME_STEP
+from poise.baselines.policy_files.networks import onnx_session
+from poise.baselines.policy_files.script_sizes import script_sizes
 
 LONGEST = 50  # steps of a history that is guessed
 #: terms that most policies see, and their numbers; joints and actions are added
@@ -17,6 +19,14 @@ MAYBE = (
     (("", 0), ("phase", 2), ("phase_cos, phase_sin", 4)),
     (("", 0), ("base_lin_vel", 3)),
 )
+#: what trackers of a motion see, in the order of BeyondMimic: numbers for each joint, and others
+TRACKERS = (
+    (("motion_command", 2, 0), ("motion_anchor_ori_b", 0, 6), ("base_ang_vel", 0, 3),
+     ("joint_pos_rel", 1, 0), ("joint_vel", 1, 0), ("last_action", 1, 0)),
+    (("motion_command", 2, 0), ("motion_anchor_pos_b", 0, 3), ("motion_anchor_ori_b", 0, 6),
+     ("base_lin_vel", 0, 3), ("base_ang_vel", 0, 3), ("joint_pos_rel", 1, 0), ("joint_vel", 1, 0),
+     ("last_action", 1, 0)),
+)  # fmt: skip
 #: field of a description → what it is called in the projects that policies come from
 WORDS = {
     "joints": "the order of the joints: joint_names, dof_names, joint_ids_map",
@@ -42,6 +52,11 @@ class Sizes:
 
     inputs: dict[str, int | None]
     outputs: dict[str, int | None]
+
+    @property
+    def gives_clip(self) -> bool:
+        """Whether it takes the step of a clip, whose frames it gives."""
+        return TIME_STEP in self.inputs and set(JOINTS) <= set(self.outputs)
 
 
 @dataclass(frozen=True)
@@ -92,6 +107,11 @@ def layouts(size: int, actions: int, joints: int) -> Iterator[Layout]:
     for steps in range(1, LONGEST + 1):
         if size % steps:
             continue
+        for terms in TRACKERS:
+            sizes = [(name, each * actions + fixed) for name, each, fixed in terms]
+            frame = sum(numbers for _, numbers in sizes)
+            if frame * steps == size:
+                yield Layout(tuple(f"{name} {numbers}" for name, numbers in sizes), frame, steps)
         for n, (names, more) in product(dict.fromkeys((actions, joints)), options):
             frame = 6 + 2 * n + actions + more
             if frame * steps == size:

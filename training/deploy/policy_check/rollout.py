@@ -1,16 +1,16 @@
 """A rollout that a policy's maker recorded, and what it tells of a description."""
 
-from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.policy_files.observations import Observer
-from poise.baselines.policy_files.terms import Place, Seen, meaning
-from poise.configs.archives import read_arrays
+from poise.baselines.policy_files.controller import PolicyFile, observer_of
+from poise.baselines.policy_files.motion.track import MOTION_TERMS
+from poise.baselines.policy_files.networks import OnnxNetwork
+from poise.baselines.policy_files.terms import CLOCKS, COMMANDS, Place, Seen, meaning
+from poise.configs.archives import read_archive, read_arrays
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
 
@@ -18,7 +18,7 @@ CLOSE = 1e-3  # of an observation's numbers, which others compute in 32 bits fro
 SAME = 1e-4  # of actions from the same observations
 UNIT = 0.01  # of the length of a direction
 #: terms that a rollout does not tell: they follow what was commanded
-COMMANDED = ("velocity_commands", "phase", "phase_sin", "phase_cos")
+COMMANDED = (*COMMANDS, *CLOCKS, *MOTION_TERMS)
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,17 @@ class Rollout:
     """Steps of a policy as its maker saw them: T of them.
 
     Attributes:
-        observations: (T, n) what the network was given.
+        observations: (T, n) what each input of the network was given; "" stands for the only one.
         actions: (T, na) what it answered.
         qpos, qvel: (T, nq), (T, nv) the states, as MuJoCo has them of this robot; None: not told.
+        memories: (T, …) what it remembered before each step, by name; empty: not told.
     """
 
-    observations: np.ndarray
+    observations: dict[str, np.ndarray]
     actions: np.ndarray
     qpos: np.ndarray | None = None
     qvel: np.ndarray | None = None
+    memories: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -46,62 +48,94 @@ class Finding:
     text: str
 
 
-def read_rollout(path: Path) -> Rollout:
-    """The arrays `observations` and `actions` of an .npz file; `qpos` and `qvel`, if it has them.
+def read_rollout(
+    path: Path, inputs: Sequence[str] = ("",), memories: Sequence[str] = ()
+) -> Rollout:
+    """The arrays of an .npz file: `observations` and `actions`, and what else it has.
+
+    `qpos` and `qvel` are the states. Of a network that remembers the file may hold each memory
+    before each step, by its name; of one with several inputs it holds each of them by its name in
+    the place of `observations`.
 
     Raises ConfigError for a file without the first two, and for arrays of other shapes.
     """
-    arrays = read_arrays(path, ("observations", "actions"))
-    with suppress(ConfigError):  # states need not be told
-        arrays |= read_arrays(path, ("qpos", "qvel"))
-    rollout = Rollout(**{name: np.squeeze(values) for name, values in arrays.items()})
-    steps = {len(values) for values in arrays.values()}
-    if len(steps) != 1 or rollout.observations.ndim != 2 or rollout.actions.ndim != 2:
+    names = {each: each or "observations" for each in inputs}
+    held = {name.removesuffix(".npy") for name in read_archive(path).names}
+    states = [name for name in ("qpos", "qvel") if name in held]
+    known = [name for name in memories if name in held]
+    arrays = read_arrays(path, (*names.values(), "actions", *states, *known))
+    steps = {len(values) for values in arrays.values() if values.ndim}
+    flat = {name: values.reshape(len(values), -1) if values.ndim > 2 and 1 in values.shape[1:]
+            else values for name, values in arrays.items() if name not in known}  # fmt: skip
+    if len(steps) != 1 or any(flat[name].ndim != 2 for name in (*names.values(), "actions")):
         shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
         raise ConfigError(f"needs (T, n) observations and (T, na) actions, not {shapes}",
                           source=path)  # fmt: skip
-    return rollout
+    return Rollout({each: flat[name] for each, name in names.items()}, flat["actions"],
+                   **{name: flat[name] for name in states},
+                   memories={name: arrays[name] for name in known})  # fmt: skip
 
 
-def compare(policy: PolicyFile, rollout: Rollout, source: Path) -> list[Finding]:
-    """What a rollout tells of a policy's network and of how its observation is put together.
+def compare(policy: PolicyFile, source: Path) -> list[Finding]:
+    """What the rollout in a file tells of a policy's network and of its observation.
 
-    Raises ConfigError for a policy with several inputs, and for observations or actions of another
-    size.
+    Raises ConfigError as `read_rollout`, and for observations or actions of another size.
     """
-    if len(policy.observer.sizes) != 1:
-        raise ConfigError("a rollout of one input can be compared, not of several", source=source)
-    sizes = *policy.observer.sizes.values(), len(policy.action)
-    given = rollout.observations.shape[1], rollout.actions.shape[1]
-    if sizes != given:
-        raise ConfigError(f"has {given[0]} observations and {given[1]} actions, the description "
-                          f"{sizes[0]} and {sizes[1]}", source=source)  # fmt: skip
-    return [_network(policy, rollout), *_terms(policy, rollout)]
+    inputs, memories = policy.observer.sizes, policy.network.memories()
+    rollout = read_rollout(source, list(inputs), list(memories))
+    given = {name: rows.shape[1] for name, rows in rollout.observations.items()}
+    actions = rollout.actions.shape[1], len(policy.action)
+    for name, size in inputs.items():
+        if (given[name], actions[0]) != (size, actions[1]):
+            raise ConfigError(f"has {given[name]} {name or 'observations'} and {actions[0]} "
+                              f"actions, the description {size} and {actions[1]}",
+                              source=source)  # fmt: skip
+    return [*_network(policy, rollout), *_terms(policy, rollout)]
 
 
-def _network(policy: PolicyFile, rollout: Rollout) -> Finding:
-    """Whether the network answers as it did."""
-    policy.network.reset()
-    (name,) = policy.observer.sizes
-    answers = [policy.network.act({name: each})["action"] for each in rollout.observations]
-    policy.network.reset()
-    worst = float(np.max(np.abs(np.array(answers) - rollout.actions)))
-    return Finding("network", worst <= SAME, f"its actions differ by {worst:.1g} at most")
+def _network(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
+    """Whether the network answers as it did, and remembers what it did."""
+    network, worst = policy.network, 0.0
+    apart = dict.fromkeys(rollout.memories, 0.0)
+    network.reset()
+    for step, action in enumerate(rollout.actions):
+        given = {name: rows[step] for name, rows in rollout.observations.items()}
+        if step == 0:
+            policy.warm_up(given)
+        before = network.memories()
+        for name, rows in rollout.memories.items():
+            if step:
+                off = np.max(np.abs(before[name].ravel() - rows[step].ravel()))
+                apart[name] = max(apart[name], float(off))
+        network.remember({name: rows[step] for name, rows in rollout.memories.items()})
+        worst = max(worst, float(np.max(np.abs(network.act(given)["action"] - action))))
+    remembers = isinstance(network, OnnxNetwork) and bool(network.memories())
+    network.reset()
+    hint = ""
+    if worst > SAME and remembers and not rollout.memories:
+        hint = ("; it was asked from zeros: a rollout that begins later needs what it remembered "
+                f"before each step, {', '.join(network.memories())} (T, …)")  # fmt: skip
+    yield Finding("network", worst <= SAME, f"its actions differ by {worst:.1g} at most{hint}")
+    for name, off in apart.items():
+        yield Finding(f"memory {name}", off <= SAME, f"differs by {off:.1g} at most")
 
 
 def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
     """Each term of the observation, at the first place of each age."""
-    (places,) = policy.observer.places().values()
-    for place in places:
-        where = f"{place.term.term} at {place.start}:{place.start + place.size}"
-        if place.age:
-            where += f", {place.age} steps ago"
-        yield Finding(where, *_judged(place, policy, rollout))
+    for name, places in policy.observer.places().items():
+        for place in places:
+            where = f"{place.term.term} at {place.start}:{place.start + place.size}"
+            where = f"{name}: {where}" if name else where
+            if place.age:
+                where += f", {place.age} steps ago"
+            yield Finding(where, *_judged(place, name, policy, rollout))
 
 
-def _judged(place: Place, policy: PolicyFile, rollout: Rollout) -> tuple[bool | None, str]:
-    """Whether a term is right, and what was found of it."""
-    observed = rollout.observations[place.age + 1 :]
+def _judged(
+    place: Place, name: str, policy: PolicyFile, rollout: Rollout
+) -> tuple[bool | None, str]:
+    """Whether a term of an input is right, and what was found of it."""
+    observed = rollout.observations[name][place.age + 1 :]
     shown = observed[:, place.start : place.start + place.size]
     expected = _expected(place, policy, rollout)
     if expected is not None and len(expected):
@@ -125,9 +159,8 @@ def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray 
         return None
     now = replace(place.term, history=1, lag=0)
     config = replace(policy.config, observations=(now,), history="term")
-    joints, names = policy.joints, policy.robot.joint_names
-    known, moved = ([names[i] for i in each] for each in (joints.index, joints.moved))
-    alone = Observer(config, known, moved, "")
+    joints = policy.joints
+    alone = observer_of(policy.robot, config, joints)
     simulation, found = Simulation(policy.robot), []
     for step in range(1, len(rollout.actions) - place.age):
         if rollout.qpos is not None and rollout.qvel is not None:

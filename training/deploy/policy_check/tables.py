@@ -7,11 +7,18 @@ from rich.console import Console
 from poise.baselines.allowance import is_script
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.known import PLACES, Known, find_network, how_to_get, places
+from poise.baselines.policy_files.refused import refused_families
 from poise.training.running.tables import text_table
 
-from .check import SECONDS, PolicyCheck
+from .check import PolicyCheck
 from .guess import WORDS
+from .proposals import SECONDS as TRIED
+from .standing import SECONDS, Stood
 
+OPEN = {
+    "history": "not said: how its history lies; each usual order was tried:",
+    "clock": "not said: what its clock shows at rest; tried:",
+}
 VERDICTS = {True: "right", False: "WRONG", None: "not told"}
 
 
@@ -38,6 +45,8 @@ def print_policies(known: list[Known], console: Console) -> None:
                   "the projects here or beside the repository, and in ../shared/rivals: "
                   f"{', '.join(looked) or 'none of them is there'}",
                   markup=False, highlight=False)  # fmt: skip
+    for name, refused in refused_families().items():
+        console.print(f"{name}: not described: {refused}", markup=False, highlight=False)
     for each in missing:
         name, file = next(iter(each.origin.files.items()))
         path = f"{each.origin.folder}/{name}" if each.origin.folder else name
@@ -56,20 +65,48 @@ def print_check(check: PolicyCheck, console: Console) -> None:
     say(f"{check.file}: takes {sides[0]}; gives {sides[1]}")
     if check.known is not None:
         say(f"it is {check.known}, a known policy: that name plays it, too")
+    if check.sizes.gives_clip:
+        say("it tracks a motion, whose frames it gives for each time_step: motion: {clip: network}")
+    if check.held:
+        say("it tracks a motion, of which the first frame is held here: poise motion follow CLIP "
+            f"--controller {check.known or check.file} plays one")  # fmt: skip
     if check.stood is None:
         _say_missing(check, say)
         return
     for name in check.unsaid:
         taken = getattr(PolicyFileConfig(), name)
-        say(f"not said: {name} ({WORDS[name]}); {taken or 'the first joints'} is taken")
-    stood = check.stood
-    how = f"fell after {stood.fell:.2f} s" if stood.fell is not None else (
-        f"stood for {SECONDS:g} s, {'at rest' if stood.rests else 'never at rest'}, "
-        f"{1000.0 * stood.moved:.0f} mm from where it began")  # fmt: skip
-    say(how)
+        if name == "joints":
+            taken = "the robot's first joints, in its order,"
+        say(
+            f"not said: {name} ({WORDS[name]}); {taken} {'are' if name == 'joints' else 'is'} taken"
+        )
+    _say_tried(check, say)
+    say(_how(check.stood, SECONDS))
     for finding in check.findings:
         say(f"  {VERDICTS[finding.right]}: {finding.what}: {finding.text}")
     say(_verdict(check))
+
+
+def _how(stood: Stood, seconds: float) -> str:
+    """How it stood, for so many seconds."""
+    if stood.fell is not None:
+        return f"fell after {stood.fell:.2f} s"
+    return (f"stood for {seconds:g} s, {'at rest' if stood.rests else 'never at rest'}, "
+            f"{1000.0 * stood.moved:.0f} mm from where it began")  # fmt: skip
+
+
+def _say_tried(check: PolicyCheck, say: Callable[[str], None]) -> None:
+    """The readings that were tried of what is left open, and the one that is proposed."""
+    for what in dict.fromkeys(each.what for each in check.tried):
+        say(OPEN[what])
+        for each in check.tried:
+            if each.what == what:
+                say(f"  {each.name}: {_how(each.stood, TRIED)}")
+    if sum(each.stood.fell is None for each in check.tried if each.what == "history") > 1:
+        say("more than one of them stands: a rollout (--rollout) tells which is right")
+    if check.proposed is not None:
+        say(f"so read, {check.proposed.name}, it does best; in the description:")
+        say(check.proposed.lines)
 
 
 def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:
@@ -89,6 +126,8 @@ def _skeleton(check: PolicyCheck) -> str:
     """A description with places to fill in."""
     lines = ["kind: policy-file", f"policy: {check.file.rpartition('/')[2]}"]
     lines += [f"{name}: ...  # {WORDS[name]}" for name in check.unsaid if name != "observations"]
+    if check.sizes.gives_clip:
+        lines.append("motion: {clip: network}")
     lines.append("observations:")
     for layout in check.layouts[:1]:
         names = [name for term in layout.terms for name in term.split(", ")]
@@ -101,6 +140,8 @@ def _verdict(check: PolicyCheck) -> str:
     wrong = sum(each.right is False for each in check.findings)
     if wrong:
         return f"the adapter is wrong: {wrong} of {len(check.findings)} findings speak against it"
+    if check.amends and check.stood is not None and check.stood.fell is None:
+        return "it stands, read as proposed: its own description does not fit its network"
     if check.stood is not None and check.stood.fell is not None:
         return "it does not stand: another robot, gains, order of joints, or term than its own"
     if not check.findings:

@@ -1,5 +1,6 @@
 """A guessed description as a file, for its owner to correct."""
 
+import os
 from pathlib import Path
 
 import yaml
@@ -21,7 +22,8 @@ def load_and_write(name: str) -> tuple[Robot, Path | None]:
 
     One is written to the current folder for a model alone, called as it, where there is no file
     of that name, which may be somebody's work; what is missing in it, such as torque limits, is
-    then asked for by its name. The file has what is not the default, and the model's whole path.
+    then asked for by its name. The file has what is not the default, and the model's path relative
+    to its own folder: the two can be moved together.
 
     Raises ConfigError as `load_robot` and `guess`.
     """
@@ -32,7 +34,8 @@ def load_and_write(name: str) -> tuple[Robot, Path | None]:
     plain = to_dict(RobotDescription(**NOTHING))  # type: ignore[arg-type]
     fields = to_dict(description)
     kept = {name: value for name, value in fields.items() if value != plain.get(name)}
-    kept["source"] = {kind: str(model.absolute()) for kind, file in fields["source"].items()
+    relative = os.path.relpath(model, path.parent)
+    kept["source"] = {kind: relative for kind, file in fields["source"].items()
                       if kind in ("mjcf", "urdf") and file}  # fmt: skip
     for part in ("posture", "options"):
         own = {name: value for name, value in fields[part].items() if value != plain[part][name]}

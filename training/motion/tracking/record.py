@@ -17,6 +17,7 @@ LAST = 1.0  # [s] of a trial whose error is told apart
 COUNTED = 0.5  # [s] after the motion's end until which errors count
 AFTER = 3.0  # [s] that a trial goes on after the motion's end: a fall takes its time
 SETTLING = 6.0  # [s] that it goes on after a push at least: steps home take as long
+LIFTED = 5  # policy steps off the ground after which a sole lands anew: 0.1 s
 LANDING = 25  # policy steps after which feet of a disturbed start have landed
 ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an episode
 
@@ -32,7 +33,7 @@ class TrackingFigures(StepFigures):
     body_error_root: float  #: the same, relative to the root body [m]
     body_error_last: float  #: `body_error` of the trial's last second [m]
     com_error: float  #: mean distance of the CoM from the motion's [m]
-    #: largest distance of a sole from where it landed after the disturbed start [m]
+    #: largest distance of a sole from where it last landed [m]
     sole_slide: float
     motion_delay: float  #: by how much the motion is late at the end [s]; 0 unless it waits
 
@@ -105,12 +106,16 @@ class Footing:
 
     Attributes:
         stance: of the soles now, or when both were last on the ground.
-        slide: largest distance of a sole from where it landed [m].
+        slide: largest distance of a sole from where it last landed [m].
+
+    A sole that has been off the ground for 0.1 s (`LIFTED` policy steps) lands anew where it
+    touches the ground; one that loses contact for less slides on.
     """
 
     def __init__(self, state: RobotState):
         self.stance, self.slide = Stance.of(state), 0.0
         self._landed: np.ndarray | None = None
+        self._off = np.zeros(2, int)  # policy steps since a sole touched the ground
         self._steps = 0
 
     def update(self, state: RobotState) -> None:
@@ -121,8 +126,12 @@ class Footing:
         if self._landed is None and self._steps >= LANDING:
             self._landed = state.sole_points.copy()
         if self._landed is not None:
+            down = np.asarray(state.contacts) > 0.0
+            anew = down & (self._off >= LIFTED)
+            self._landed[anew] = state.sole_points[anew]
+            self._off = np.where(down, 0, self._off + 1)
             ways = np.linalg.norm((state.sole_points - self._landed)[:, :2], axis=1)
-            self.slide = max(self.slide, float(ways.max()))
+            self.slide = max(self.slide, float(ways[down].max(initial=0.0)))
 
 
 def lies(env: ResidualBalanceEnv) -> bool:

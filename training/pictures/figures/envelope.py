@@ -96,7 +96,8 @@ def polar_envelope(
             return
         ax.set_thetagrids(angles, [right_angle(angle) for angle in angles])
         ax.tick_params(axis="x", pad=9)
-        ax.set_rgrids(rings, [f"{r:g}" for r in rings], angle=RING_LABELS, color=GREY, size=9)
+        texts = [*(f"{ring:g}" for ring in rings[:-1]), f"{rings[-1]:g} {unit}".rstrip()]
+        ax.set_rgrids(rings, texts, angle=RING_LABELS, color=GREY, size=9)
         for text in ax.get_yticklabels():
             text.set_bbox({"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.8})
         said = f"J50 [{unit}]: half of the pushes are recovered. Band: 95 % interval."

@@ -26,8 +26,9 @@ def fall_probability(
     *,
     bins: int = BINS,
     xlabel: str = "push impulse, as a fraction of the ankle limit",
+    lost: str = "not recovered",
 ) -> None:
-    """Fraction of trials that ended in a fall against the impulse, with the fitted curves.
+    """Fraction of trials that were lost against the impulse, with the fitted curves.
 
     Dots are bins with about equally many trials each, bars their Wilson 95 % intervals, a line ends
     where the impulses end, and a tick on the 50 % line marks J50.
@@ -39,6 +40,7 @@ def fall_probability(
         bins: largest number of dots per controller; with at most as many distinct impulses, each of
             them is a bin.
         xlabel: what the impulse is a fraction of.
+        lost: what a trial is that is not recovered; of walks "fallen".
 
     Raises:
         ValueError: trials that `fit_logistic` refuses too.
@@ -46,7 +48,7 @@ def fall_probability(
     """
     fits = fits or {}
     with saved_figure(out, *SIZE) as figure:
-        ax = _rates(figure, "trials not recovered")
+        ax = _rates(figure, f"trials {lost}")
         ax.axhline(0.5, color=GREY, lw=0.8, ls=(0, (2, 3)), zorder=1)
         for k, (name, (impulse, recovered)) in enumerate(trials.items()):
             impulse, recovered = check_trials(impulse, recovered)
@@ -67,7 +69,7 @@ def fall_probability(
             draw_line(ax, s, x, y, label)
             draw_marks(ax, s, ".0%", x=s.x + shift)
         ax.set_xlabel(xlabel)
-        headline(figure, "Pushes that are not recovered", "Bars: 95 % intervals.")
+        headline(figure, f"Pushes after which a trial is {lost}", "Bars: 95 % intervals.")
         legend_below(figure, columns=2)
 
 

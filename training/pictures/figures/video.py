@@ -11,6 +11,9 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.mdp.termination import has_diverged
+from poise.envs.physics.collapse import DURATION as FALLING
+from poise.envs.physics.collapse import Collapse
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.renderer import SceneRenderer
 
@@ -35,9 +38,10 @@ def record(
 ) -> dict[str, Any]:
     """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play, or as a WebP.
 
-    The file appears complete or not at all. Every n-th policy step is drawn, with n such that the
-    video has about `fps` frames a second; drawing takes most of the time. A WebP is for pages, and
-    small by default.
+    The file appears complete or not at all. A robot that falls is shown until it lies on the
+    ground, with damped motors; that is no part of the episode. Every n-th policy step is drawn,
+    with n such that the video has about `fps` frames a second; drawing takes most of the time. A
+    WebP is for pages, and small by default.
 
     Args:
         env: one of Poise's environments, wrapped or not, in any render mode.
@@ -66,7 +70,7 @@ def record(
         "path": str(path),
         "frames": frames,
         "fps": rate,
-        "seconds": episode.base.simulation.time,
+        "seconds": episode.seconds,
         "fallen": episode.base.fallen,
         "recovered": bool(episode.info["is_success"]),
         "return": episode.total,
@@ -88,7 +92,7 @@ def record_together(
     """Film several episodes side by side, each under its name; returns the number of frames.
 
     They run at the same time, so they must have the same policy period. One that has ended stays as
-    it was then, until the last has ended.
+    it was then, until the last has ended; one that has fallen goes to the ground first.
 
     Raises:
         ConfigError: the path, rate or size is not valid, or periods or sizes differ.
@@ -114,6 +118,8 @@ class Episode:
     Attributes:
         frame: the picture (height, width, 3) uint8 that `draw` has made last.
         done: it has ended.
+        over: there is nothing more to see: it has ended, and lies on the ground if it fell.
+        seconds: that it has lasted [s].
         total: sum of rewards.
     """
 
@@ -137,17 +143,27 @@ class Episode:
     def start(self) -> None:
         """Begin anew, with its first picture."""
         self.observation, self.info = self.env.reset(**self.reset_kwargs)
-        self.total, self.done = 0.0, False
+        self.total, self.done, self.over, self.seconds = 0.0, False, False, 0.0
         self.draw()
 
     def step(self) -> None:
-        """Play one policy step, unless it has ended."""
+        """Play one policy step; after a fall, one of the way to the ground."""
         if self.done:
+            self._fall()
             return
         self.observation, reward, terminated, truncated, self.info = self.env.step(
             self.act(self.observation)
         )
         self.total, self.done = self.total + float(reward), terminated or truncated
+        if self.done:
+            self.seconds = self.base.simulation.time
+            self.over = not self.base.fallen or has_diverged(self.base.simulation.views)
+            self._collapse = Collapse(self.base.simulation)
+
+    def _fall(self) -> None:
+        if not self.over:
+            self._collapse.step(self.base.substeps)
+            self.over = self.base.simulation.time > self.seconds + FALLING
 
     def draw(self) -> None:
         """Bring the picture up to date."""
@@ -179,12 +195,12 @@ def _film(
         for each in episodes:
             each.start()
         send(frame())
-        while not all(each.done for each in episodes):
-            playing = [each for each in episodes if not each.done]
+        while not all(each.over for each in episodes):
+            playing = [each for each in episodes if not each.over]
             for each in playing:
                 each.step()
             step += 1
-            ended = all(each.done for each in episodes)
+            ended = all(each.over for each in episodes)
             if step % every == 0 or ended:
                 for each in playing:
                     each.draw()

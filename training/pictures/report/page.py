@@ -9,11 +9,12 @@ from pathlib import Path
 from rich.console import Console
 
 from poise.baselines.allowance import allow_words, allowing
-from poise.configs.errors import PoiseError
+from poise.configs.errors import PoiseError, raised
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
-from poise.training.benchmarking.evaluation.tables import assisted
+from poise.training.benchmarking.evaluation.tables import assisted, walked
 from poise.training.benchmarking.results.read import Record, Results, load_results
+from poise.training.benchmarking.trials.agents import code_of
 from poise.training.pictures.figures.style import Inline
 from poise.training.pictures.figures.time_series import signal_keys, trial_timeseries
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
@@ -127,6 +128,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         trials=trials if trials.size <= PACKED else None,
         summary_file=_file(results, SUMMARY, JSON_BYTES),
         crowded=len(order) > CROWD,
+        by_falls=walked(results.summary["controllers"]),
     )  # fmt: skip
 
 
@@ -172,7 +174,7 @@ def _film(
     except PoiseError as error:
         reason = str(error)
     except Exception as error:  # a controller from outside may raise anything
-        reason = f"{type(error).__name__}: {error}"
+        reason = raised(error)
     note = f"{record.controller} was not played again: {reason}."
     if note not in notes:
         notes.append(note)
@@ -218,7 +220,7 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
         "command": shlex.join([
             *("poise", "replay", str(results.folder), "--trial", str(record.trial)),
             *("--controllers", record.controller, "--video", "trial.mp4"),
-            *allow_words(record.controller),
+            *allow_words(code_of(record.controller)),
         ]),
     }  # fmt: skip
 
@@ -226,7 +228,9 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
 def _ending(record: Record) -> str:
     if record.recovered:
         return "recovered"
-    return f"fell after {record.fall_time:.2f} s" if record.fallen else "stood, but not quiet"
+    if record.fallen:
+        return f"fell after {record.fall_time:.2f} s"
+    return "upright, not as commanded" if record.line.get("commands") else "stood, but not quiet"
 
 
 def _facts(results: Results) -> list[tuple[str, str]]:

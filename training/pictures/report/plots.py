@@ -6,7 +6,8 @@ from typing import cast
 import numpy as np
 from markupsafe import Markup
 
-from poise.training.benchmarking.metrics.played import DIRECTIONAL
+from poise.training.benchmarking.evaluation.tables import walked
+from poise.training.benchmarking.metrics.played import DIRECTIONAL, WALK_PUSH
 from poise.training.benchmarking.results.read import Results
 from poise.training.benchmarking.statistics.fits import fit_logistic, trial_bins
 from poise.training.benchmarking.statistics.rates import wilson_interval
@@ -23,7 +24,7 @@ from .cells import Download, csv_text, download
 
 SMALL = 2.2  # width of one controller's own picture [in]
 PARTS = {"envelope": "Standard pushes", "grid": "Grid of pushes", "random": "Random pushes",
-         "mix": "Random mix"}  # fmt: skip
+         "mix": "Random mix", "walk_push": "Pushes while it walks"}  # fmt: skip
 CURVES = ("part", "controller", "push_share", "not_recovered", "trials", "rate_low", "rate_high",
           "fit_half_at", "fit_bound", "fit_scale")  # fmt: skip
 NONE = (np.nan, np.nan)
@@ -35,9 +36,12 @@ def swatch(index: int) -> Markup:
 
 
 def forests(results: Results) -> list[Markup]:
-    """J50, where it was measured, and the recovery rate of all controllers, the best first."""
+    """J50, where it was measured, and the rates of recovered trials and of those without a fall of
+    all controllers, the best first."""
     order, entries = results.controllers, results.summary["controllers"]
-    j50, rates = [], []
+    j50: list[Series] = []
+    recovered: list[Series] = []
+    upright: list[Series] = []
     for name in results.summary["ranking"]:
         entry, index = entries[name], order.index(name)
         if "j50_mean" in entry:
@@ -45,9 +49,15 @@ def forests(results: Results) -> list[Markup]:
             j50.append(series(name, index, [(0.0, entry["j50_mean"], *ends)]))
         count, of = entry["recovered"], entry["trials"]
         ends = wilson_interval(count, of)
-        rates.append(series(name, index, [100.0 * np.array([0.0, count / of, *ends])]))
+        recovered.append(series(name, index, [100.0 * np.array([0.0, count / of, *ends])]))
+        if (rate := entry.get("never_fell_rate")) is not None:
+            ends = both_ends(entry.get("never_fell_ci95")) or NONE
+            upright.append(series(name, index, [100.0 * np.array([0.0, rate, *ends])]))
     pictures = []
-    for found, title in ((j50, J50_MEAN.heading), (rates, "recovered trials [%]")):
+    titled = [(recovered, "recovered trials [%]"), (upright, "trials without a fall [%]")]
+    if walked(entries):
+        titled = [titled[1], (recovered, "trials that go on as commanded [%]")]
+    for found, title in ((j50, J50_MEAN.heading), *titled):
         if found:
             out = Inline(f"{title}: {'; '.join(s.told(0, '.1f') for s in found)}.")
             forest(out, found, title, ".1f")
@@ -105,7 +115,8 @@ def step_lines(results: Results) -> dict[str, tuple[list[float], list[float]]]:
 
 
 def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
-    """Fraction of trials that were not recovered over the push, with a title, and its bins as CSV.
+    """Fraction of trials that were not recovered (of walks: that fell) over the push, with a title,
+    and its bins as CSV.
 
     There is a picture of each part whose pushes are measured by a limit.
     """
@@ -137,16 +148,17 @@ def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]
                            if limits.get(record.direction) else record.fraction for record in own],
                           dtype=float)  # fmt: skip
         known = np.isfinite(shares)
-        trials[name] = shares[known], np.array([record.recovered for record in own])[known]
+        trials[name] = shares[known], np.array([record.won for record in own])[known]
         fits[name] = fit = fit_logistic(*trials[name])
         lines += [
             (part, name, *found, *wilson_interval(*found[1:]), fit.j50, fit.bound, fit.scale)
             for found in trial_bins(*trials[name], BINS)
         ]
-    told = "; ".join(f"{name} {'half at' if fit.bound is None else 'only a bound,'} {fit.j50:.2f}"
+    told = "; ".join(f"{name} {'J50' if fit.bound is None else 'J50, only a bound,'} {fit.j50:.2f}"
                      for name, fit in fits.items())  # fmt: skip
-    out = Inline(f"Fraction of trials not recovered, over the {title}: {told}.")
-    fall_probability(out, trials, fits, xlabel=title)
+    lost = "fallen" if part == WALK_PUSH else "not recovered"
+    out = Inline(f"Fraction of trials {lost}, over the {title}: {told}.")
+    fall_probability(out, trials, fits, xlabel=title, lost=lost)
     return out.svg, lines
 
 
@@ -171,6 +183,6 @@ def _envelopes(
         for name, entries in own.items()
     ]
     if not measured:
-        return f"of the {results.summary['scale']}", found, None
+        return f"× {results.summary['scale']}", found, None
     angles, limit = zip(*results.summary["robot"]["ankle_limit"], strict=True)
     return "N·s", found, (angles, limit)

@@ -3,17 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from poise.training.benchmarking.evaluation.tables import places
+from poise.training.benchmarking.evaluation.tables import places, walked
 from poise.training.benchmarking.results.read import Results
 from poise.training.running.columns import (
     AGAINST,
     AIMED,
+    AS_COMMANDED,
     ERRORS,
     ETA_MEAN,
     ETA_WORST,
     FAILURES,
     FAILURES_RECOVERED,
-    FALLS,
     GAIN,
     HALF_AT,
     J50_BOUNDED,
@@ -21,6 +21,7 @@ from poise.training.running.columns import (
     J50_PER_MASS,
     J50_WORST,
     LOSSES,
+    NOT_FALLEN,
     P_VALUE,
     PAIRED,
     RECOVERED,
@@ -58,12 +59,13 @@ def ranking(results: Results, baseline: str) -> Table | None:
     """Every controller with what the benchmark measures, the best first."""
     entries, rated = results.summary["controllers"], results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
-    columns = (
+    rates = (NOT_FALLEN, AS_COMMANDED) if walked(entries) else (RECOVERED, NOT_FALLEN)
+    columns: tuple[Column, ...] = (
         RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
-        replace(HALF_AT, words=f"half of the trials survive, of the {results.summary['scale']}"),
-        replace(RECOVERED, words=f"fraction of all trials{mix}"),
+        replace(HALF_AT, unit=f"× {results.summary['scale']}", words="half of the trials survive"),
+        *(replace(each, words=f"{each.words}{mix}") for each in rates),
         replace(TRIED[0], words=f"that the rate is of{mix}"),
-        *AGAINST, P_VALUE, FALLS[1], ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT,
+        *AGAINST, P_VALUE, ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT,
     )  # fmt: skip
     rank, against = places(entries), _against(results, baseline)
     rows = [

@@ -3,10 +3,15 @@
 import math
 
 from poise.training.benchmarking.diagnosis.words import towards
-from poise.training.benchmarking.evaluation.tables import assisted, places
+from poise.training.benchmarking.evaluation.tables import (
+    SEPARATED,
+    assisted,
+    places,
+    walked,
+)
 from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.running.summary import both_ends
+from poise.training.running.summary import Summary, both_ends
 
 from .cells import number_text
 
@@ -22,16 +27,47 @@ def lead(results: Results) -> list[str]:
     what = "random trials" if summary["rated"] else "trials"
     ranks = places(summary["controllers"])
     tied = [name for name in fair if ranks[name] == 1 and name != first]
-    place = f"ties with {' and '.join(tied)} for the first place" if tied else "comes first"
-    said = [f"{first} {place}{alone}: it recovers {best['recovered_rate']:.1%} of "
-            f"{best['trials']} {what}."]  # fmt: skip
+    place = "comes first"
+    if tied:
+        place = f"ties with {' and '.join(tied)} for the first place"
+    elif len(fair) > 1 and (doubt := _not_separated(summary, first, fair[1])):
+        place = doubt
+    rate, tried = best["recovered_rate"], f"{best['trials']} {what}"
+    upright = best.get("never_fell_rate")
+    if upright is None:
+        said = [f"{first} {place}{alone}: it recovers {rate:.1%} of {tried}."]
+    elif walked(summary["controllers"]):
+        said = [f"{first} {place}{alone}: it does not fall in {upright:.1%} of {tried}, and goes "
+                f"on as commanded in {rate:.1%}."]  # fmt: skip
+    else:
+        said = [f"{first} {place}{alone}: it recovers {rate:.1%} of {tried}, and does not fall in "
+                f"{upright:.1%}."]  # fmt: skip
     if "j50_mean" in best:
         around = both_ends(best["j50_mean_ci95"])
-        text = f"Half of its trials are recovered at {best['j50_mean']:.1f} N·s"
-        text += f" ({around[0]:.1f} to {around[1]:.1f})" if around else ""
+        fell = walked(summary["controllers"])
+        text = f"{'It falls in half' if fell else 'Half'} of its trials"
+        text += f"{'' if fell else ' are recovered'} at {best['j50_mean']:.1f} N·s"
+        text += f" (95 % {around[0]:.1f} to {around[1]:.1f})" if around else ""
         text += f": {best['eta_mean']:.2f} of the ankle limit, {best['eta_min']:.2f} in the worst"
         said.append(text + " direction, over all directions.")
     return said
+
+
+def _not_separated(summary: Summary, first: str, second: str) -> str:
+    """How far the trials tell the first two apart; empty where they do.
+
+    By the interval of the gain in J50 where controllers are ranked by that, else by McNemar's test.
+    """
+    pairs = [pair for pair in summary["pairs"] if {pair["a"], pair["b"]} == {first, second}]
+    if not pairs:
+        return f"is listed first, not compared with {second} on the same trials"
+    pair = pairs[0]
+    words = f"is listed first, not separated from {second}"
+    if ends := both_ends(pair.get("j50_gain_ci95")):
+        low, high = (100.0 * end for end in ends)
+        return "" if low * high > 0.0 else f"{words} (gain in J50 {low:+.1f} to {high:+.1f} %)"
+    p = pair.get("p_mcnemar", 1.0)
+    return "" if p < SEPARATED else f"{words} (McNemar p = {p:.2f})"
 
 
 def push_text(record: Record, trial: Trial) -> str:

@@ -71,7 +71,7 @@ def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> li
     """
     recovered: dict[tuple[str, ...], dict[str, Record]] = {}
     for record in results.records:
-        if record.recovered:
+        if record.won:
             recovered.setdefault(record.met, {})[record.controller] = record
     exhibits = []
     for name in order:
@@ -82,17 +82,19 @@ def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> li
         record = (shown or lost)[0]
         winners = recovered.get(record.met, {})
         what = "The smallest push" if math.isfinite(record.fraction) else "The first trial"
-        reason = f"{what} that {name} did not recover"
+        fell = record.fallen and record.judged_by_falls
+        reason = f"{what} {f'in which {name} fell' if fell else f'that {name} did not recover'}"
         if shown:
-            reason += f" and {baseline} did"
+            reason += f" and {baseline} did{' not' if fell else ''}"
         others = tuple(winner for winner in winners if winner != baseline)
         exhibits.append(Exhibit(record, reason, winners.get(baseline), others))
     return exhibits
 
 
 def smallest_lost(results: Results, name: str) -> list[Record]:
-    """The trials that a controller did not recover, the smallest push first, without its errors."""
-    lost = [r for r in results.of(name) if not r.recovered and not r.error]
+    """The trials that a controller did not recover (of walks: in which it fell), the smallest push
+    first, without its errors."""
+    lost = [r for r in results.of(name) if not r.won and not r.error]
     return sorted(lost, key=_size)
 
 

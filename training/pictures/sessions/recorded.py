@@ -8,6 +8,9 @@ import numpy as np
 from poise.baselines.allowance import listed
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.mdp.termination import has_diverged
+from poise.envs.physics.collapse import DURATION as FALLING
+from poise.envs.physics.collapse import Collapse
 from poise.training.benchmarking.diagnosis.words import why
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import replay
@@ -31,13 +34,24 @@ class Recorder:
             self.env, self._observer = env, Observer(env)
         self.frames.append(self._observer(env.simulation.time if env.fallen else None))
 
+    def fall(self) -> None:
+        """Add the way of a robot that fell to the ground, when its trial is over."""
+        if self.env is None or self._observer is None or not self.env.fallen:
+            return
+        if has_diverged(self.env.simulation.views):
+            return
+        end, collapse = self.env.simulation.time, Collapse(self.env.simulation)
+        while self.env.simulation.time < end + FALLING:
+            collapse.step(self.env.substeps)
+            self.frames.append(self._observer(end))
+
 
 def recorded_trial(
     folder: Path, trial: int, controllers: Sequence[str] = (), allow: str | Iterable[str] = ()
 ) -> tuple[Recorded, list[str]]:
     """A trial by up to three of the controllers that took part, side by side.
 
-    A trial that a robot fell in is over for it; it stays as it fell.
+    A trial that a robot fell in is over for it; it goes to the ground, and stays as it lies there.
 
     Args:
         folder: written by `evaluate` or `benchmark`.
@@ -61,6 +75,7 @@ def recorded_trial(
     reasons: dict[str, str] = {}
     for name, recorder in zip(names, recorders, strict=True):
         done = replay(results, trial, name, watch=recorder, allow=allow)
+        recorder.fall()
         differs = "differs from the record" if done.differences else "exactly as recorded"
         lines.append(f"trial {trial}, {name}: {_end(done.outcome)}, {differs}")
         if reason := why(done.outcome, done.outcome.fall_time):
@@ -78,6 +93,8 @@ def recorded_trial(
 
 
 def _end(outcome: Outcome) -> str:
+    if outcome.loss == "off command":
+        return "upright, not as commanded"
     return "recovered" if outcome.recovered else "fell" if outcome.fallen else "not quiet"
 
 

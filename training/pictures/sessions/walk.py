@@ -13,6 +13,8 @@ from poise.baselines.walking.walk import allocate_gait, limits_of_legs
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.physics.engines.config import load_physics
+from poise.envs.physics.engines.engine import check_engine
 from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
@@ -40,6 +42,7 @@ def walk(
     robot: str = "humanoid",
     terrain: str | Mapping[str, object] = "flat",
     realism: str | Path | None = None,
+    physics: str | Path | None = None,
     push: str | None = None,
     push_at: float = 6.0,
     seed: int = 0,
@@ -56,6 +59,7 @@ def walk(
         robot: a packaged robot or a path to its description.
         terrain: a kind of terrain, or a mapping with its `kind`, see `make_terrain`.
         realism: a packaged level of realism or a path to one; None: ideal.
+        physics: a packaged engine or a path to its settings; None: MuJoCo.
         push: impulse [N·s] and direction [deg], such as "20@90", of a push of 0.1 s; None: none.
         push_at: the start of the push [s].
         seed: of the start, which is a little disturbed.
@@ -76,10 +80,12 @@ def walk(
     commands = parse_commands(command, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     ground = make_terrain(terrain, "walk")
+    engine = load_physics(physics)
+    check_engine(engine, loaded, ground)
     check_asked(controller, loaded, commands, ground)  # a controller takes long to be made
     agent = load_agent(
         controller, loaded, duration=duration, pushes=None, terrain=ground,
-        realism=load_realism(realism),
+        realism=load_realism(realism), physics=engine,
     )  # fmt: skip
     check_walks(controller, agent, "walk")
     trial = Trial(0, seed, pushes, commands=commands)

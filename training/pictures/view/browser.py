@@ -8,7 +8,7 @@ from functools import partial
 
 import viser
 
-from poise.configs.errors import PoiseError
+from poise.configs.errors import PoiseError, raised
 from poise.envs.viewing.quantities import Quantity
 from poise.training.pictures.sessions.frames import between
 from poise.training.pictures.sessions.live import Frames, Play
@@ -199,7 +199,7 @@ class BrowserView:
             self._pages.say(str(error), "red")
         except Exception as error:  # a controller from outside, or a page that is not ours
             self.paused = True
-            self._pages.say(f"{type(error).__name__}: {error}", "red")
+            self._pages.say(raised(error), "red")
 
     def _draw(self, now: float) -> None:
         self._drawn = now

@@ -16,6 +16,7 @@ KINDS = {
     "guards": "a recovery policy over a walker, where a CONTROLLER is named",
     "suites": "--suite",
     "realism": "--realism",
+    "physics": "--physics",
     "training": "poise train --config",
     "tuning": "poise tune --config",
     "motions": "--motion",
@@ -24,7 +25,8 @@ KINDS = {
     "limits": "--limits",
     "human": "poise gait --human",
 }
-# j50: robot → name → mean J50 [N·s] of the leaderboards in docs/results; policies: name → for what
+# j50: robot → name → mean J50 [N·s] of the leaderboards in docs/results; suites: robot → theirs;
+# policies: name → for what
 FIGURES = "packaged.json"
 MOVES = {
     "residual": "targets",
@@ -53,8 +55,18 @@ class Named(TypedDict, total=False):
 
 def named() -> dict[str, list[Named]]:
     """Every packaged name by its kind, with what is known of it."""
-    known = json.loads((packaged_folder(".") / FIGURES).read_text())
+    known = _known()
     return {kind: [_named(kind, name, known) for name in packaged(kind)] for kind in KINDS}
+
+
+def suites_of_j50() -> dict[str, str]:
+    """Return the suite by which J50 was measured, by robot."""
+    return dict(_known()["suites"])
+
+
+def _known() -> dict[str, dict[str, Any]]:
+    known: dict[str, dict[str, Any]] = json.loads((packaged_folder(".") / FIGURES).read_text())
+    return known
 
 
 def _named(kind: str, name: str, known: dict[str, dict[str, Any]]) -> Named:

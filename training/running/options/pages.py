@@ -46,8 +46,10 @@ def print_commands(usage: str, commands: Mapping[str, Callable[..., object]],
     console.print(table)
 
 
-def print_names(kinds: Mapping[str, list[Named]], console: Console) -> None:
-    """Print a table of each kind of names."""
+def print_names(
+    kinds: Mapping[str, list[Named]], suites: Mapping[str, str], console: Console
+) -> None:
+    """Print a table of each kind of names, and by which suite J50 was measured on each robot."""
     for kind, entries in kinds.items():
         console.print(Text(f"\n{kind} ({KINDS[kind]})", style="bold"))
         table = Table.grid(padding=(0, 2))
@@ -58,6 +60,8 @@ def print_names(kinds: Mapping[str, list[Named]], console: Console) -> None:
             cells = (entry.get(key, "") for key in keys)
             table.add_row(*(Text(f"{x:.1f}" if isinstance(x, float) else str(x)) for x in cells))
         console.print(table)
+    told = ", ".join(f"{suite} on {robot}" for robot, suite in suites.items())
+    console.print(Text(f"\nJ50: mean over all directions, as on the leaderboards; suite {told}"))
 
 
 def first_sentence(text: str | None) -> str:

@@ -113,13 +113,17 @@ def capture(before: Clip, after: Clip, duration: float) -> Clip:
     return _joined(before, tail.start, [bent_a, seam_once], after, head.stop)
 
 
-def inertial(before: Clip, after: Clip, half_life: float) -> Clip:
+def inertial(before: Clip, after: Clip, half_life: float, *, faced: bool = True) -> Clip:
     """B from its begin, with what A differs from it dying away: lasts T_A + T_B.
+
+    B is turned to face as A does at its end, or with `faced` False keeps its heading.
 
     B(t) Exp(o(t)) with o(0) = a ⊖ b at the rate of their difference, and o a critically damped
     spring: y = 2 ln 2/h, j = ȯ₀ + y o₀, o = e^(−yt)(o₀ + j t). C¹.
     """
+    given = after
     after, _ = _prepared(before, after, half_life, "inertial")
+    after = after if faced else given.resampled(before.dt)
     after = _placed(after, before.root[-1])
     a, b = state_at(before, len(before) - 1), state_at(after, 0)
     gap = minus(a.root, a.rotations, b.root, b.rotations)

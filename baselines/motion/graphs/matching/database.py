@@ -9,7 +9,7 @@ import numpy as np
 from poise.baselines.motion.clips.clip import Clip
 from poise.configs.errors import ConfigError
 
-from .features import AHEAD, FUTURE, clip_features, groups
+from .features import AHEAD, FUTURE, clip_features, groups, steady_heading
 from .search import NearestPoint
 
 RATE = 1.0 / 30.0  # [s] between frames
@@ -43,6 +43,7 @@ class MatchingDatabase:
         self.clips, self.ahead = tuple(clip.resampled(RATE) for clip in clips), AHEAD
         _check_skeletons(self.clips)
         tables = [clip_features(clip) for clip in self.clips]
+        self.headings = [steady_heading(clip) for clip in self.clips]  # (F,) of each [rad]
         raw = np.concatenate(tables)
         self.mean, self.scale = raw.mean(axis=0), _scales(raw, weights or {})
         self.starts = np.cumsum([0, *(len(table) for table in tables)])
@@ -53,6 +54,8 @@ class MatchingDatabase:
         if not len(self.entries):
             raise ConfigError(f"no clip is longer than {max(AHEAD):g} s", field="clips")
         self.search = NearestPoint(self.values[self.entries])
+        # where the frames that are gone to are after the longest time: x, y [m] and (cos, sin)
+        self.reached = raw[self.entries, -sum(group.size for group in FUTURE) :]
 
     def normalised(self, features: np.ndarray) -> np.ndarray:
         """Features (…, n) as columns of the database."""
@@ -67,6 +70,14 @@ class MatchingDatabase:
         """The frame of a row of `values`."""
         clip = int(np.searchsorted(self.starts, row, side="right")) - 1
         return Match(clip, row - int(self.starts[clip]), distance)
+
+    def nearest_way(self, future: np.ndarray) -> tuple[float, float, float]:
+        """How far ahead and to the left [m] and by how much turned [rad] the frame goes whose place
+        after the longest time is nearest to that of a `future` as `query` takes it."""
+        goal = future[-self.reached.shape[1] :]
+        gaps = np.linalg.norm(self.reached - goal, axis=1)  # 1 rad of turn counts as 1 m
+        x, y, cos, sin = self.reached[int(np.argmin(gaps))]
+        return float(x), float(y), float(np.arctan2(sin, cos))
 
     def query(self, clip: int, frame: int, future: np.ndarray) -> np.ndarray:
         """(n,) the posture of a frame with another future: for every time ahead x, y [m] and

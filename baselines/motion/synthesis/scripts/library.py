@@ -1,9 +1,10 @@
-"""Scripts that come with Poise, and scripts by name, file or text."""
+"""Scripts that come with Poise, and scripts by name, file, table or text."""
 
 from poise.configs.files import packaged_folder
 from poise.configs.reading import is_file
 
 from .parser import parse, read_script
+from .table import begins_with_number, read_table
 from .tree import Script
 
 
@@ -13,18 +14,26 @@ def packaged_scripts() -> list[str]:
 
 
 def find_script(script: str) -> Script:
-    """A ``.motion`` file, a packaged script by its name, or the text of a script itself.
+    """A ``.motion`` file, a ``.csv`` table of one (`table.read_table`), a packaged script by its
+    name, or the text of a script itself.
 
     Raises ConfigError as `parse`, and for a file that is not there.
     """
     packaged = packaged_folder("scripts") / f"{script}.motion"
     if script.isidentifier() and is_file(packaged):
         return read_script(packaged)
+    if script.endswith(".csv"):
+        return read_table(script)
     return read_script(script) if script.endswith(".motion") else parse(script)
 
 
 def names_script(text: str) -> bool:
-    """Whether a name of a motion is rather that of a script, or a script: a file, or an arrow."""
+    """Whether the name of a motion is that of a script, or a script: a file, or an arrow.
+
+    A ``.csv`` file that begins with a number is a clip of postures, not a table.
+    """
+    if text.endswith(".csv"):
+        return not begins_with_number(text)
     return text.endswith(".motion") or "->" in text or text in packaged_scripts()
 
 

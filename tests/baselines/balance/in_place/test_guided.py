@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import solve_continuous_lyapunov
+from scipy.optimize import minimize_scalar
 
 from poise.baselines.balance.in_place.capture_point import CapturePoint, CapturePointConfig
 from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
@@ -69,6 +71,25 @@ def test_lqr_gain_is_optimal():
         best = cost(K, start)
         for change in ([0.2, 0.0], [-0.2, 0.0], [0.0, 0.2], [0.0, -0.2]):
             assert cost(K + change, start) > best + 1e-6
+
+
+def test_bellmans_equation_holds_of_the_gain():
+    """With V = xᵀPx the cost to come of p = K x, min over p of xᵀQx + p² + V̇ is 0 in every state,
+    and at p = K x: K = −BᵀP. The cost from a state to the end is V there."""
+    A, B = np.array([[0.0, 1.0], [1.0, 0.0]]), np.array([0.0, -1.0])
+    Q, K = np.diag([3.0, 0.5]), lqr_gain(3.0, 0.5)
+    closed = A + np.outer(B, K)
+    P = solve_continuous_lyapunov(closed.T, -(Q + np.outer(K, K)))
+    np.testing.assert_allclose(K, -B @ P, atol=1e-8)
+    for x in np.random.default_rng(0).normal(size=(20, 2)):
+        slope = 2.0 * P @ x
+
+        def right(p, x=x, slope=slope):
+            return x @ Q @ x + p * p + slope @ (A @ x + B * p)
+
+        best = minimize_scalar(right, bracket=(-10.0, 10.0))
+        assert best.fun == pytest.approx(0.0, abs=1e-7)
+        assert best.x == pytest.approx(K @ x, abs=1e-5)
 
 
 def test_the_pendulum_is_stepped_exactly():

@@ -13,6 +13,7 @@ from poise.baselines.balance.in_place.pd import (
 )
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.envs.physics.simulation import Simulation
 from tests.support.shared import generic_state, robot
 
 STIFF = PDGains(damping=0.35)  # explicit PD diverges with these every 4 ms
@@ -54,6 +55,53 @@ def test_feedforward_is_added_within_the_limits():
     limit = pd.arrays.torque_limit
     expected = np.clip(holding_torques(state)[pd.arrays.motor_dofs - 6], -limit, limit)
     np.testing.assert_allclose(pd.torques(state, targets), expected, atol=1e-10)
+
+
+ARMS = ("right_shoulder1", "right_shoulder2", "right_elbow", "left_elbow")
+
+
+def standing_joints(alone=(), move=None, seconds=2.0):
+    """Joints, what holds them and their references after standing; joints `alone` have PD without
+    feed-forward, and one reference may move."""
+    pd, plain = PD(robot()), PD(robot(), PDConfig(feedforward=False))
+    motors = [list(pd.arrays.motor_dofs - 6).index(joint) for joint in alone]
+    simulation = Simulation(robot())
+    state = simulation.reset()
+    targets = Targets.standing(robot(), state)
+    start = targets.q_ref.copy()
+    for step in range(round(seconds / 0.004)):
+        if move is not None:
+            joint, rate, told = move
+            targets.q_ref[joint] = start[joint] + 0.004 * step * rate
+            targets.v_ref[joint] = rate if told else 0.0
+        torques = pd.torques(state, targets).copy()
+        torques[motors] = plain.torques(state, targets)[motors]
+        state = simulation.step(torques, 2)
+    assert state.com[2] - state.origin[2] > 0.7  # it stands
+    return state.q.copy(), holding_torques(state), targets.q_ref
+
+
+@pytest.mark.parametrize("feedforward", [False, True])
+def test_the_steady_error_is_the_load_over_the_stiffness(feedforward):
+    """K (q_ref − q) = τ at rest, so PD alone hangs below its reference by τ/K; with the
+    feed-forward of τ it does not. Of arms, which nothing else holds."""
+    arms = [robot().joint_names.index(name) for name in ARMS]
+    q, load, reference = standing_joints(() if feedforward else arms, seconds=3.0)
+    assert np.abs(load[arms]).max() > 0.5  # [N m]
+    expected = 0.0 if feedforward else load[arms] / PD(robot()).stiffness[arms]
+    np.testing.assert_allclose((reference - q)[arms], expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("told", [False, True])
+def test_the_lag_is_the_damping_times_the_rate_over_the_stiffness(told):
+    """Behind a reference of constant rate v it lags by D v/K, and not if it is given the rate; the
+    joint's own damping is in the feed-forward."""
+    elbow, rate = robot().joint_names.index("right_elbow"), 0.4
+    pd = PD(robot())
+    q, _, reference = standing_joints(move=(elbow, rate, told))
+    lag = pd.damping[elbow] * rate / pd.stiffness[elbow]
+    assert lag > 0.01
+    assert (reference - q)[elbow] == pytest.approx(0.0 if told else lag, abs=0.4 * lag)
 
 
 def test_implicit_is_explicit_for_a_short_period():

@@ -190,3 +190,60 @@ def test_what_the_robot_or_the_caller_lacks_is_named(robot):
     ]:
         with pytest.raises(ConfigError, match=word):
             sampler.sample(rng, robot)
+
+
+def test_a_specific_force_is_a_peak_force_over_the_mass(robot):
+    """2 N/kg for 2 s is F T of a step, and 2/π F T of half a sine; both profiles are drawn."""
+    sampler = PushSampler((2.0, 2.0), "specific_force", duration=(2.0, 2.0), profile="any")
+    rng = np.random.default_rng(0)
+    pushes = [sampler.sample(rng, robot)[0] for _ in range(40)]
+    assert {push.profile for push in pushes} == {"square", "half-sine"}
+    for push in pushes:
+        assert push.peak_force == pytest.approx(2.0 * robot.mass)
+        share = 1.0 if push.profile == "square" else 2.0 / np.pi
+        assert push.impulse == pytest.approx(share * 4.0 * robot.mass)
+
+
+def test_an_episode_of_gusts_has_one_side(robot):
+    """All are within `spread` of one direction, which differs from episode to episode."""
+    sampler = PushSampler((1.0, 1.0), "impulse", count=(8, 8), spread=20.0)
+    rng, sides = np.random.default_rng(0), []
+    for _ in range(200):
+        angles = np.radians([push.direction for push in sampler.sample(rng, robot)])
+        side = np.angle(np.exp(1j * angles).mean())
+        off = np.degrees(np.abs(np.angle(np.exp(1j * (angles - side)))))
+        assert off.max() < 40.0
+        sides.append(np.degrees(side) % 360.0)
+    assert np.histogram(sides, 4, (0, 360))[0].min() > 30
+
+
+def test_either_side_mirrors_all_pushes_of_an_episode(robot):
+    """Directions of an episode are all to the left or all to the right."""
+    sampler = PushSampler(
+        (1.0, 1.0), "impulse", direction=(60.0, 120.0), count=(3, 3), either_side=True
+    )
+    rng = np.random.default_rng(0)
+    signs = []
+    for _ in range(50):
+        directions = np.array([push.direction for push in sampler.sample(rng, robot)])
+        assert np.all((np.abs(directions) >= 60.0) & (np.abs(directions) <= 120.0))
+        assert abs(np.sign(directions).sum()) == 3
+        signs.append(np.sign(directions[0]))
+    assert 15 < sum(sign > 0 for sign in signs) < 35
+
+
+def test_an_episode_is_of_one_of_several_distributions(robot):
+    """Each is as likely as the others, and is what it is by itself."""
+    short = PushSampler((5.0, 5.0), "impulse")
+    long = PushSampler((1.0, 1.0), "specific_force", duration=(2.0, 2.0), count=(2, 2))
+    sampler = replace(short, others=(long,))
+    rng = np.random.default_rng(0)
+    counts = [len(sampler.sample(rng, robot)) for _ in range(200)]
+    assert 70 < counts.count(2) < 130 and set(counts) == {1, 2}
+    assert build(PushSampler, to_dict(sampler), "again") == sampler
+
+
+def test_what_is_new_is_left_out_of_files(robot):
+    """Fingerprints of policies hash configurations, which had no such fields."""
+    data = to_dict(PushSampler((1.0, 1.0), "impulse"))
+    assert not {"spread", "either_side", "others"} & data.keys()

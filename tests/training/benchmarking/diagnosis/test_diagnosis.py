@@ -156,11 +156,17 @@ def test_words() -> None:
     assert cause(replace(found, foothold="slipped"), 2).endswith("its steps were not enough")
     assert cause(replace(found, foothold="slipped", foothold_time=0.7), 2).endswith("d slipped")
     plain = replace(found, foothold=None, failures_from=None)
-    assert cause(plain, 0) == "ankle_y at its limit, then no step"
+    assert cause(plain, 0) == "ankle_y at its limit, then no planned step"
     assert cause(replace(plain, failures_from=0.5), 1).startswith("QP without a solution, then one")
+    late = replace(plain, failures_from=0.9, full_motor=None, full_from=None)
+    assert cause(late, 0) == "no motor of the legs at its limit, then no planned step"
+    assert "from 0.90 s on, when it was falling already" in why(late)
+    early = replace(late, failures_from=0.8)
+    assert cause(early, 0) == "QP without a solution, then no planned step"
+    assert "falling already" not in why(early)
     assert cause(replace(plain, hardware="ankle motors too hot"), 0).startswith("ankle motors too")
     counted = losses([(plain, 0), (found, 2), (plain, 0), (Diagnosis(), 0)])
-    assert told_losses(counted) == ("of 3 losses 2: ankle_y at its limit, then no step; "
+    assert told_losses(counted) == ("of 3 losses 2: ankle_y at its limit, then no planned step; "
                                     "1: ankle_y at its limit, then a foothold missed")  # fmt: skip
     assert why(diagnosis_of({})) == "" and told_losses([]) == ""
     assert push_told(Push("torso", 1.0, 0.1, 20.0, 90.0)) == (

@@ -229,7 +229,9 @@ def test_a_controller_that_raises_costs_its_trial_alone(
     assert main([*command, "flaky.py:Flaky", "zero"]) == 1
     lines = rows(tmp_path / "out")
     failed = [row for row in lines if row["error"]]
-    assert failed and all(row["error"] == "ArithmeticError: too fast" for row in failed)
+    line = FLAKY[: FLAKY.index("raise")].count("\n") + 1
+    error = f"ArithmeticError: too fast (flaky.py:{line})"
+    assert failed and all(row["error"] == error for row in failed)
     assert all(row["controller"] == "flaky.py:Flaky" and int(row["seed"]) > 0 for row in failed)
     assert len(failed) < TRIALS and len(lines) == 2 * TRIALS
     assert f"raised an error in {len(failed)} trials" in capsys.readouterr().err

@@ -91,14 +91,16 @@ def test_the_words_of_a_table_are_explained_below_it() -> None:
     text = printed(summary)
     line = f"McNemar p ≥ 0.05: these trials do not separate the two ({len(pairs) - below} of "
     assert line in text and "steps, mean: of all trials" in text
-    assert "half at:" not in text
+    assert "half of the pushes" not in text
     failures = sum(each["solver_failures_recovered"] for each in summary["controllers"].values())
     assert f"were falling; {failures} in trials that were recovered" in text
     for entry in summary["controllers"].values():
-        entry.update(fraction50=0.8, fraction50_bound=None, steps_mean=0.0)
+        entry.update(fraction50=0.8, fraction50_ci95=(0.7, 0.92), fraction50_bound=None)
+        entry["steps_mean"] = 0.0
     summary["pairs"] = []
     text = printed(summary)
-    assert "half at: half of the pushes that are this fraction of the ankle limit are" in text
+    assert "J50 [× ankle limit]: half of the pushes of this size are recovered, with the" in text
+    assert "[0.70," in text  # the interval, which may be folded
     assert "McNemar" not in text and "steps, mean" not in text
 
 
@@ -108,11 +110,13 @@ def test_lost_trials_are_listed_with_the_command_that_shows_one() -> None:
     text = io.StringIO()
     lost = {"a": [], "my[own].py:B": [3, 17], "c": list(range(4, 12))}
     entries: dict[str, Any] = {name: {} for name in lost}
-    entries["c"] = {"losses": [{"cause": "ankle_y at its limit, then no step", "trials": 8}]}
+    entries["c"] = {
+        "losses": [{"cause": "ankle_y at its limit, then no planned step", "trials": 8}]
+    }
     print_lost(lost, entries, Path("out/x"), Console(file=text, width=40))
     assert text.getvalue().splitlines() == [
         "lost trials of my[own].py:B: 3, 17 (poise view out/x --trial 3 --controllers "
         "'my[own].py:B' --allow 'my[own].py:B')",
         "lost trials of c: 4, 5, 6, 7, 8, … (8) (poise view out/x --trial 4 --controllers c)",
-        "  of 8 losses 8: ankle_y at its limit, then no step",
+        "  of 8 losses 8: ankle_y at its limit, then no planned step",
     ]

@@ -213,7 +213,7 @@ def test_later_results_take_their_rows(tmp_path: Path) -> None:
     text = page.read_text()
     assert text.index("`pd` | 10.0 [") < text.index("`abe07` | 8.0 [")
     assert f"poise leaderboard {a} {b}`" in text and "15.0" not in text and "50.0" not in text
-    (line,) = (line for line in text.splitlines() if line.startswith("Played later"))
+    (line,) = (line for line in text.splitlines() if line.startswith("Run later"))
     assert line.endswith("cores: `abe07`.")
     data = json.loads((b / "summary.json").read_text())
     (b / "summary.json").write_text(json.dumps({**data, "seed": data["seed"] + 1}))

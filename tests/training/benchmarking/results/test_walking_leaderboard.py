@@ -54,8 +54,8 @@ def test_walks_are_ranked_by_j50_whatever_the_order_of_results(tmp_path: Path) -
     assert float(places["`walk`"][2].split()[0]) > float(places["`walk-spring`"][2].split()[0])
     walks = [level for level in entry["walks"] if level["part"] == "walk"]
     fallen, minutes = sum(w["fallen"] for w in walks), sum(w["minutes"] for w in walks)
-    assert fallen > 0 and places["`walk-spring`"][6] == f"{fallen} of {6 * len(walks)}"
-    assert places["`walk-spring`"][7].startswith(f"{fallen / minutes:.2f} [")
+    assert fallen > 0 and places["`walk-spring`"][7] == f"{fallen} of {6 * len(walks)}"
+    assert places["`walk-spring`"][8].startswith(f"{fallen / minutes:.2f} [")
 
 
 def test_one_without_a_j50_comes_last_without_a_rank(tmp_path: Path) -> None:
@@ -92,6 +92,36 @@ def test_the_page_says_what_j50_is_of() -> None:
     assert told(0.2, 0.2) == f"{pushes}, of 0.2 s."
     assert told(0.1, None) == f"{pushes}, of 0.1 s for `walk`."
     assert told(0.2, 0.1) == f"{pushes}, of 0.1 s for `walk-spring`, of 0.2 s for `walk`."
+
+
+def by_falls(data: dict[str, Any]) -> None:
+    """Make it a result of today."""
+    for entry in data["controllers"].values():
+        entry["criterion"] = "not fallen"
+
+
+def test_older_verdicts_are_not_ranked_among_newer_ones(tmp_path: Path) -> None:
+    """A J50 that counts walks off their command as lost has no place beside those by falls; the
+    page says which it is."""
+    pages = []
+    for name, changes in (("old", (None, None)), ("mixed", (None, by_falls)),
+                          ("new", (by_falls, by_falls))):  # fmt: skip
+        sources = [
+            source if change is None else changed(tmp_path / f"{name}{k}.json", source, change)
+            for k, (source, change) in enumerate(zip((ONE, OTHER), changes, strict=True))
+        ]
+        page = tmp_path / f"{name}.md"
+        write_leaderboard(sources, page)
+        pages.append(page.read_text())
+    old, mixed, new = pages
+    assert "These results are older" in old and "goes by falls" not in old
+    assert rows(old) == rows(new) and "goes by falls" in new and "are older" not in new
+    assert "because their results are older and count walks off their command as lost: `walk`." in (
+        mixed
+    )
+    ranked = {row[1]: row for row in rows(mixed)[2:4]}
+    assert ranked["`walk-spring`"][0] == "1" and ranked["`walk`"][0] == "–"
+    assert ranked["`walk`"][2] == "–" and " of 48" in ranked["`walk`"][5]
 
 
 @pytest.mark.parametrize(

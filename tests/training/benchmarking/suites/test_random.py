@@ -13,6 +13,7 @@ from poise.configs.schema import build
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import LimitTable, PushSampler
 from poise.envs.robots.robot import load_robot
+from poise.training.benchmarking.diagnosis.record import swing_of
 from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.suites.random import Sequence
 from poise.training.benchmarking.suites.suite import Suite, load_suite
@@ -119,6 +120,34 @@ def test_touchdowns_count_feet_that_were_in_the_air() -> None:
     assert touchdowns.count == 2  # not landed
     touchdowns.update(np.ones(2))
     assert touchdowns.count == 4
+
+
+def test_steps_are_those_that_were_planned() -> None:
+    """Of a controller with a plan: the foot that it swung; a foot that is thrown up is none."""
+    touchdowns = Touchdowns(2, 0.02)
+    for swinging, count in ((-1, 0), (1, 0), (0, 1), (0, 2)):
+        for _ in range(5):
+            touchdowns.update(np.array([0.0, 1.0]), swinging)
+        touchdowns.update(np.ones(2), -1)  # it has landed, and swings no more
+        assert touchdowns.count == count
+
+
+@pytest.mark.parametrize(
+    ("name", "swings"), [("momentum-qp", -1), ("feedback-step", -1), ("zero", None)]
+)
+def test_whose_plan_is_seen(name: str, swings: int | None) -> None:
+    """Feet that stay swing never, those of a planner when it says so; without one nobody knows."""
+    env = load_agent(name, load_robot("humanoid"), duration=0.1, pushes=None).env
+    env.reset(seed=0)
+    assert swing_of(env) == swings
+
+
+def test_feet_that_stay_take_no_step(limits: PushLimits) -> None:
+    """However they tilt and lift while the robot falls."""
+    agent = load_agent("momentum-qp", limits.robot, duration=2.5, pushes=None)
+    push = Push("torso", 0.2, 0.1, 32.0, 180.0)
+    outcome = run_trial(agent, Trial(0, 1, (push,)))
+    assert outcome.fallen and outcome.steps == 0
 
 
 @pytest.mark.parametrize(

@@ -65,29 +65,66 @@ def test_pushes_come_at_all_phases(limits: PushLimits) -> None:
 
 
 def test_second_stage_pushes_walk_too(limits: PushLimits) -> None:
-    """Around each controller's own J50, at commands and times of their own."""
+    """Around each controller's own J50, at commands and times of their own; not to fall counts."""
     plan = Plan(load_suite("walk-push"), limits, 7, ["walk"])
-    won = {("walk", t.number): Outcome(t.pushes[0].impulse < 20.0, False) for t in plan.first}
-    second = plan.second(won)["walk"]
+    held = {("walk", t.number): Outcome(False, t.pushes[0].impulse >= 20.0) for t in plan.first}
+    second = plan.second(held)["walk"]
     assert len(second) == 16 * 24 and {trial.part for trial in second} == {"walk_push"}
     assert all(10.0 <= trial.pushes[0].impulse <= 33.0 for trial in second)
     assert len({trial.pushes[0].start for trial in second}) == len(second)
     assert all(trial.commands for trial in second)
 
 
-def test_kicks_fill_a_square(limits: PushLimits) -> None:
-    """Up to ± the speed along each axis, evenly; the environment is given them as pushes."""
+def test_who_does_not_fall_meets_larger_pushes(limits: PushLimits) -> None:
+    """Up to 2.5 N·s/kg in the second stage, where the first one makes too few fall; one at it."""
+    suite, mass = load_suite("walk-push"), limits.robot.mass
+    plan = Plan(suite, limits, 7, ["strong", "weak"])
+    assert max(trial.pushes[0].impulse for trial in plan.first) < 1.0 * mass
+    fell = {"strong": 10.0 * mass, "weak": 0.5 * mass}
+    ends = {(name, t.number): Outcome(True, t.pushes[0].impulse > most)
+            for t in plan.first for name, most in fell.items()}  # fmt: skip
+    second = plan.second(ends)
+    assert len(second["strong"]) == len(second["weak"]) == 16 * 24
+    for angle in range(0, 360, 45):
+        impulses = {
+            name: np.array([t.pushes[0].impulse for t in own if t.pushes[0].direction == angle])
+            for name, own in second.items()
+        }
+        assert impulses["strong"].max() == pytest.approx(2.5 * mass)
+        assert impulses["strong"].min() > 0.5 * mass and len(set(impulses["strong"])) == 24
+        assert impulses["weak"].max() < 1.4 * 0.6 * mass
+
+
+def kicks(suite: Suite, limits: PushLimits, level: str) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes [m/s] and directions [rad] of the kicks of a level."""
+    found = [t.kicks[0] for t in Plan(suite, limits, 7, ["walk"]).first if t.level == level]
+    return (np.array([kick.delta_v for kick in found]),
+            np.radians([kick.direction for kick in found]))  # fmt: skip
+
+
+def test_kicks_of_fixed_sizes(limits: PushLimits) -> None:
+    """1, 2 and 3 m/s in all directions alike; the environment is given them as pushes."""
+    suite = load_suite("walk-kick")
+    for size in (1.0, 2.0, 3.0):
+        sizes, angles = kicks(suite, limits, f"{size:g} m/s")
+        assert len(sizes) == 100 and (sizes == size).all()
+        counts, _ = np.histogram(angles % (2.0 * np.pi), 4, (0.0, 2.0 * np.pi))
+        assert counts.min() >= 12
     found = trials("walk-kick", limits)
+    assert len(found) == 300 and found[0].options["push"] == [found[0].kicks[0]]
+
+
+def test_kicks_fill_a_square(limits: PushLimits) -> None:
+    """Up to ± the speed along each axis, evenly, besides those of fixed sizes."""
+    suite = build(Suite, {"walk_kick": {"speeds": [0.5, 1.0], "sizes": [2.0]}}, "suite")
+    assert len(kicks(suite, limits, "2 m/s")[0]) == 400
     for speed in (0.5, 1.0):
-        kicks = [trial.kicks[0] for trial in found if trial.level == f"± {speed:g} m/s"]
-        assert len(kicks) == 400
-        angle = np.radians([kick.direction for kick in kicks])
-        size = np.array([kick.delta_v for kick in kicks])
+        size, angle = kicks(suite, limits, f"± {speed:g} m/s")
+        assert len(size) == 400
         for part in (size * np.cos(angle), size * np.sin(angle)):
             assert np.abs(part).max() <= speed + 1e-9 and np.abs(part).max() > 0.97 * speed
             assert abs(np.mean(part)) < 0.1 * speed
             assert np.std(part) == pytest.approx(speed / np.sqrt(3.0), rel=0.1)
-    assert found[0].options["push"] == [found[0].kicks[0]]
 
 
 def test_repeated_pushes_wait_for_the_walk(limits: PushLimits) -> None:
@@ -108,7 +145,8 @@ def test_repeated_pushes_wait_for_the_walk(limits: PushLimits) -> None:
         ),
         ({"velocity": {"courses": {"a": []}}}, "velocity: courses: needs one command or more"),
         ({"velocity": {"courses": {"a": [{}, {}]}}}, "courses.a: start: must increase"),
-        ({"walk_kick": {"speeds": []}}, "walk_kick: speeds: must not be empty"),
+        ({"walk_kick": {"speeds": []}}, "walk_kick: speeds: must not be empty where"),
+        ({"walk_push": {"reach": 0.5, "impulses": [0.1, 1.0]}}, "reach: must be above impulses, 1"),
         ({"walk_push": {}, "grid": {}}, "J50 is that of a walk or of standing, not of both"),
         ({"walk_push": {"impulses": [2.0, 1.0]}}, "impulses: .* must increase"),
     ],

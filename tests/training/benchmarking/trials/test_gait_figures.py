@@ -203,12 +203,14 @@ def test_only_settled_strides_count() -> None:
     np.testing.assert_array_equal(fell.settled, told.settled & (ends <= 14.0))
 
 
-def test_as_commanded_is_within_5_cm_a_second_and_5_degrees() -> None:
-    """Speeds on both sides of the limit; too few steps, and a robot that has stopped."""
+def test_as_commanded_is_within_5_cm_a_second_and_5_degrees_a_second() -> None:
+    """Speeds and turns on both sides of the limit; too few steps, and a robot that has stopped."""
     assert walk(0.5).as_commanded()
     for told, held in ((0.54, True), (0.46, True), (0.56, False), (0.44, False)):
         assert walk(0.5, told=TimedCommand(told)).as_commanded() == held
     assert not walk(0.5, told=TimedCommand(0.5, left=0.06)).as_commanded()
+    for turn, held in ((0.22, True), (0.38, True), (0.2, False), (0.4, False)):  # 5 °/s: 0.087
+        assert walk(0.4, 0.0, 0.3, TimedCommand(0.4, turn=turn)).as_commanded() == held
     still = recorded()
     down = still.down.copy()
     down[still.time > 18.5] = True
@@ -216,30 +218,46 @@ def test_as_commanded_is_within_5_cm_a_second_and_5_degrees() -> None:
     assert not Walk(recorded(seconds=1.5), (TimedCommand(0.5),)).as_commanded()
 
 
-def test_as_commanded_after_a_push() -> None:
-    """The heading is that before the push, turned as commanded since; without one, just before."""
+def changed_at(time: float, ahead: float, later: float, turned: float = 0.0) -> Walk:
+    """A walk that is commanded 0.5 m/s, goes at `ahead` and, from `time` on, at `later` m/s, in a
+    direction turned by so many degrees."""
     record = recorded()
-    for degrees, held in ((4.0, True), (6.0, False), (-6.0, False)):
-        yaw = record.yaw + np.where(record.time > 9.0, np.radians(degrees), 0.0)
-        # it walks on in the direction that it faces now
-        way = 0.5 * PERIOD * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
-        turned = replace(record, yaw=yaw, com=np.cumsum(way, axis=0))
-        pushed = Walk(turned, (TimedCommand(0.5),))
-        assert pushed.as_commanded(8.0) == held
-        assert pushed.as_commanded()
-    turning = walk(0.4, 0.0, 0.3)
-    assert turning.as_commanded(8.0) and turning.as_commanded()
-    slow = walk(0.4, 0.0, 0.3, TimedCommand(0.4, turn=0.27))
-    assert not slow.as_commanded(8.0)  # 0.03 rad/s over 10 s
-    assert slow.as_commanded()  # over 1.6 s
+    yaw = record.yaw + np.where(record.time > time, np.radians(turned), 0.0)
+    speed = np.where(record.time > time, later, ahead)[:, None]
+    way = speed * PERIOD * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+    return Walk(replace(record, yaw=yaw, com=np.cumsum(way, axis=0)), (TimedCommand(0.5),))
 
 
-def test_the_turn_that_is_commanded() -> None:
-    """The integral over commands that change."""
-    commands = (TimedCommand(turn=0.2), TimedCommand(turn=-0.5, start=3.0), TimedCommand(start=5.0))
-    told = Walk(recorded(), commands)
-    assert told.turned(1.0, 6.0) == pytest.approx(2 * 0.2 - 2 * 0.5)
-    assert told.turned(3.0, 4.0) == pytest.approx(-0.5) and told.turned(5.5, 9.0) == 0.0
+def test_a_walk_is_compared_with_its_own_strides_before_the_push() -> None:
+    """A steady error is its own; one that grows by more than 0.05 m/s is not, one that shrinks is
+    no loss. A heading is not commanded."""
+    for before, later, held in (
+        (0.5, 0.5, True), (0.35, 0.35, True), (0.65, 0.65, True), (0.35, 0.5, True),
+        (0.35, 0.31, True), (0.35, 0.29, False), (0.5, 0.44, False), (0.35, 0.65, True),
+        (0.65, 0.29, False),
+    ):  # fmt: skip
+        pushed = changed_at(9.0, before, later)
+        own = pushed.own_error(8.0)
+        assert own is not None and own.speed == pytest.approx(abs(before - 0.5), abs=1e-9)
+        assert pushed.as_commanded(own) == held, (before, later)
+    for degrees in (4.0, 30.0, -90.0):  # it walks on in the direction that it faces now
+        pushed = changed_at(9.0, 0.5, 0.5, degrees)
+        own = pushed.own_error(8.0)
+        assert own is not None and pushed.as_commanded(own)
+
+
+def test_own_strides_are_settled_and_follow_the_last_command() -> None:
+    """None before 4 s, none of another command; the worst of them counts, a turn's error too."""
+    assert walk(0.5).own_error(4.0) is None
+    other = walk(0.5, told=TimedCommand(0.9))
+    both = Walk(other.record, (TimedCommand(0.9), TimedCommand(0.5, start=8.0)))
+    assert both.own_error(11.9) is None  # no settled stride of the last command yet
+    own = both.own_error()
+    assert own is not None and own.speed == pytest.approx(0.0, abs=1e-9)
+    turning = walk(0.4, 0.0, 0.3, TimedCommand(0.4, turn=0.1))
+    own = turning.own_error(9.0)
+    assert own is not None and own.turn == pytest.approx(0.2, rel=1e-6)
+    assert turning.as_commanded(own) and not turning.as_commanded()
 
 
 def test_the_distance_from_a_circle() -> None:

@@ -23,8 +23,8 @@ from poise.training.cli.entry import main
 from poise.training.deploy.policy_check import check as checking
 from poise.training.deploy.policy_check.check import Stood, check_policy
 from poise.training.deploy.policy_check.guess import layouts
-from poise.training.deploy.policy_check.rollout import Finding, compare, read_rollout
-from tests.support.policies import linear, write_onnx, write_yaml
+from poise.training.deploy.policy_check.rollout import Finding, compare
+from tests.support.policies import linear, within, write_onnx, write_yaml
 from tests.support.shared import robot
 
 N = 25  # joints of `compact`
@@ -66,6 +66,33 @@ def test_a_bare_network_is_told_what_it_lacks(
     assert "perhaps 336 = 4 × 84: a history of 4 steps of base_ang_vel 3" in text.replace("\n", " ")
     assert "default_dof_pos" in text and "stiffness:" not in text and "damping: kd, kds" in text
     assert "- {term: joint_vel, history: 4}" in text
+
+
+@pytest.mark.parametrize(
+    ("size", "parts"),
+    [
+        (154, ("motion_command 58", "motion_anchor_ori_b 6 + base_ang_vel 3")),
+        (160, ("motion_anchor_pos_b 3 + motion_anchor_ori_b 6 + base_lin_vel 3",)),
+    ],
+)
+def test_trackers_are_guessed(size: int, parts: tuple[str, ...]) -> None:
+    """BeyondMimic's observation, without and with what only an estimator knows."""
+    text = str(next(layouts(size, 29, 29)))
+    assert all(part in text for part in parts), text
+
+
+def test_a_network_with_a_clip_is_a_tracker(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the names of its inputs and outputs; the description to begin with says so."""
+    outputs = {"joint_pos": np.zeros((3, N)), "joint_vel": np.zeros((3, N)),
+               "body_pos_w": np.zeros((3, 2, 3)), "body_quat_w": np.zeros((3, 2, 4))}  # fmt: skip
+    path = within(tmp_path / "net.onnx", 5 * N + 9, **outputs)
+    assert main(["policies", "check", str(path), "--robot", "compact"]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "it tracks a motion, whose frames it gives for each time_step" in text
+    assert "perhaps 134 = motion_command 50 + motion_anchor_ori_b 6" in text
+    assert "motion: {clip: network} observations: - {term: motion_command}" in text
 
 
 def test_a_bare_script_is_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -126,7 +153,7 @@ def record(place: Path) -> None:
 def findings(place: Path, rollout: str = "full.npz", **changes: Any) -> list[Finding]:
     config = controller_config(str(described(place, **changes)))
     policy = PolicyFile(robot("compact"), config)
-    return compare(policy, read_rollout(place / rollout), place / rollout)
+    return compare(policy, place / rollout)
 
 
 def test_a_right_adapter_agrees_with_its_makers_rollout(folder: Path) -> None:
@@ -167,8 +194,8 @@ def test_another_network_answers_otherwise(folder: Path, tmp_path: Path) -> None
     write_onnx(tmp_path / "policy.onnx", linear(9 + 3 * N, N, 0.05, seed=1))
     (network, *_) = compare(
         PolicyFile(robot("compact"), controller_config(str(described(tmp_path)))),
-        read_rollout(folder / "full.npz"), folder,
-    )  # fmt: skip
+        folder / "full.npz",
+    )
     assert network.what == "network" and network.right is False
 
 
@@ -228,8 +255,24 @@ def test_what_is_not_said_is_taken_and_told(tmp_path: Path) -> None:
     write_onnx(tmp_path / "policy.onnx", linear(3, N))
     path = write_yaml(tmp_path / "own.yaml", kind="policy-file", motors=list(range(N)), damping=3.0,
                       observations=[{"term": "base_ang_vel"}])  # fmt: skip
-    assert check_policy(str(path), robot("compact")).unsaid == (
-        "default", "stiffness")  # fmt: skip
+    unsaid = check_policy(str(path), robot("compact")).unsaid
+    assert unsaid == ("default", "stiffness", "action_scale")
+
+
+def test_what_is_said_as_it_is_by_default_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Gains of 40 and 1 and a posture of zeros may be a maker's own; joints have no names here."""
+    write_onnx(tmp_path / "policy.onnx", linear(3, N))
+    usual = {"default": [0.0] * N, "stiffness": 40.0, "damping": 1.0, "action_scale": 0.25}
+    path = write_yaml(tmp_path / "own.yaml", kind="policy-file",
+                      observations=[{"term": "base_ang_vel"}], **usual)  # fmt: skip
+    assert check_policy(str(path), robot("compact")).unsaid == ("joints",)
+    main(["policies", "check", str(path), "--robot", "compact"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert (
+        "not said: joints" in text and "the robot's first joints, in its order, are taken" in text
+    )
 
 
 def test_a_known_network_is_recognised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 from rich.console import Console
 
@@ -293,6 +295,10 @@ def test_the_command_writes_the_description_of_a_model(
     printed = capsys.readouterr()
     assert printed.out.startswith("biped.yaml: a guessed") and "no warnings" in printed.out
     described = load_robot("biped.yaml")
+    assert yaml.safe_load(Path("biped.yaml").read_text())["source"]["urdf"] == "maker/biped.urdf"
+    moved = tmp_path.with_name("moved")
+    shutil.copytree(tmp_path, moved)
+    assert load_robot(moved / "biped.yaml").fingerprint == described.fingerprint
     with pytest.warns(PoiseWarning):
         assert described.fingerprint == load_robot(path).fingerprint
     Path("biped.yaml").write_text("mine")

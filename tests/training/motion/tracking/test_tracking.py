@@ -1,6 +1,8 @@
 """Where a motion has the bodies, for soles that stand somewhere; falls relative to it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot
-from poise.training.motion.tracking.record import Tracking, lies
+from poise.training.motion.tracking.record import LANDING, LIFTED, Footing, Tracking, lies
 from poise.training.motion.tracking.reference import ReferenceBodies, Stance
 from tests.support.physics import robot_named
 
@@ -82,3 +84,28 @@ def test_the_record_ends_after_the_motion_and_after_the_push() -> None:
     env.simulation.clock[0] = round(8.0 / env.arrays.timestep)
     assert pushed.ended
     assert np.isnan(alone.figures().body_error)  # no step was taken
+
+
+@pytest.mark.parametrize(("off", "slide"), [(LIFTED, 0.01), (LIFTED - 1, 0.3)])
+def test_a_slide_is_measured_from_the_last_landing(
+    off: int, slide: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step of 0.3 m is no slide, what the sole then creeps is; a sole that loses contact for less
+    than 0.1 s has not stepped."""
+    monkeypatch.setattr(Stance, "of", lambda state: None)
+    both, points = np.ones(2), np.zeros((2, 3))
+    state = cast(Any, SimpleNamespace(contacts=both, sole_points=points))
+    footing = Footing(state)
+    for _ in range(LANDING):
+        footing.update(state)
+    state.contacts = np.array([0.0, 1.0])
+    for k in range(off):
+        points[0, 0] = 0.3 * (k + 1) / off
+        footing.update(state)
+    state.contacts = both
+    footing.update(state)
+    if off >= LIFTED:
+        assert footing.slide == 0.0
+        points[0, 1] = 0.01
+        footing.update(state)
+    assert footing.slide == pytest.approx(slide)

@@ -91,6 +91,8 @@ def test_envelope_shows_bands_limit_and_rings_from_zero(tmp_path, figures):
     reach = [band.get_paths()[0].vertices[:, 1] for band in ax.collections]
     assert [(r.min(), r.max()) for r in reach] == [(14, 16), (16, 20)]
     assert ax.get_ylim()[0] == 0 and ax.get_ylim()[1] >= 21
+    *rings, outer = [text.get_text() for text in ax.get_yticklabels()]
+    assert outer.endswith(" N·s") and all(float(ring) > 0.0 for ring in rings)
 
 
 def test_envelope_shows_what_steps_can_stop(tmp_path, figures):

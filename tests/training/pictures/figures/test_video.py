@@ -11,6 +11,7 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.training.pictures.figures.video import (
     WEBP_RATE,
     WEBP_SIZE,
+    Episode,
     frame_strip,
     record,
 )
@@ -45,6 +46,25 @@ def test_video_holds_the_episode(can_render, env, tmp_path):
     assert summary["seconds"] == pytest.approx(0.2) and summary["fps"] == 25.0
     assert summary["fallen"] is False and np.isfinite(summary["return"])
     assert [p.name for p in path.parent.iterdir()] == ["a.mp4"]
+
+
+def test_a_robot_that_falls_is_shown_until_it_lies(can_render, tmp_path):
+    """Its trial has ended before, and is told as it ended."""
+    env = gymnasium.make("poise/TorqueBalance-v0", duration=5.0, pushes=None)
+    with Episode(env, still, {"seed": 1}, (64, 48)) as episode:
+        episode.start()
+        while not episode.done:
+            episode.step()
+        fell, ended = float(episode.base.simulation.state.com[2]), episode.seconds
+        result = episode.base.episode.metrics.copy()
+        while not episode.over:
+            episode.step()
+        assert episode.base.fallen and episode.seconds == ended == pytest.approx(ended)
+        assert episode.base.simulation.state.com[2] < 0.8 * fell
+        assert np.array_equal(episode.base.episode.metrics, result)
+    summary = record(env, still, tmp_path / "a.mp4", {"seed": 1}, size=(64, 48), fps=10.0)
+    assert summary["fallen"] and summary["seconds"] == ended
+    assert summary["frames"] / summary["fps"] > ended + 1.0
 
 
 def test_a_webp_is_small(can_render, env, tmp_path):

@@ -6,7 +6,14 @@ import pytest
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.graphs.matching.features import FUTURE, LIMBS, clip_features, groups
+from poise.baselines.motion.graphs.matching.features import (
+    FUTURE,
+    LIMBS,
+    clip_features,
+    groups,
+    seen_from,
+    steady_heading,
+)
 
 AHEAD = (0.2, 0.5)
 
@@ -49,7 +56,7 @@ def test_velocities_are_seen_from_the_facing_frame(walk: Clip) -> None:
     gone = walk.root[-1, 0] - walk.root[0, 0]
     assert velocity[:, 0].mean() == pytest.approx(gone / walk.duration, rel=0.05) and gone > 0.4
     assert abs(velocity[:, 1].mean()) < 0.05
-    heading = np.unwrap(walk.facing())
+    heading = steady_heading(walk)
     assert columns(table, "turning")[:, 0] == pytest.approx(np.gradient(heading, walk.dt))
 
 
@@ -79,7 +86,7 @@ def test_limb_velocities_are_the_worlds(walk: Clip) -> None:
 def test_the_future_is_where_the_clip_goes(walk: Clip) -> None:
     """The place ahead, put into the world, is the root's then; past the end it is the end's."""
     table, steps = clip_features(walk, AHEAD), round(0.5 / walk.dt)
-    heading, root = np.unwrap(walk.facing()), walk.places()[:, 0, :2]
+    heading, root = steady_heading(walk), walk.places()[:, 0, :2]
     place, direction = columns(table, "place@0.5"), columns(table, "direction@0.5")
     for frame in (0, 17, len(walk) - 5):
         then = min(frame + steps, len(walk) - 1)
@@ -88,3 +95,18 @@ def test_the_future_is_where_the_clip_goes(walk: Clip) -> None:
         assert world == pytest.approx(root[then])
         turn = np.arctan2(*direction[frame, ::-1])
         assert turn == pytest.approx(heading[then] - heading[frame])
+
+
+def test_a_fast_walk_goes_ahead_in_its_steady_frame() -> None:
+    """Hips sway by ± 5° and more; with the sway in the heading the place 1 s ahead of a straight
+    walk would go from left to right by a tenth of the way."""
+    clip = read_bvh(find_bvh("humanoid_gaits")).clip.cut(13.5, 17.5)  # 1.2 m/s
+    sway = np.unwrap(clip.facing()) - steady_heading(clip)
+    assert np.degrees(np.ptp(sway)) > 10.0
+    inner = slice(20, -20)  # the filter's ends lean on the clip's
+    assert np.degrees(np.ptp(steady_heading(clip)[inner])) < 4.0
+    root = clip.root[30:] - clip.root[:-30]
+    steady = seen_from(steady_heading(clip)[:-30], root)
+    swaying = seen_from(np.unwrap(clip.facing())[:-30], root)
+    assert steady[:, 0].mean() == pytest.approx(1.2, abs=0.1)
+    assert steady[:, 1].std() < 0.5 * swaying[:, 1].std()

@@ -5,10 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh, packaged_clips, walking_clips
 from poise.baselines.motion.clips.rotations import angle_between
 from poise.baselines.motion.graphs.joining.states import minus
 from poise.baselines.motion.graphs.matching.database import MatchingDatabase
+from poise.baselines.motion.graphs.matching.features import steady_heading
 from poise.baselines.motion.graphs.matching.player import Command, find_pieces, match_motion
 from poise.configs.errors import ConfigError
 from tests.support.motion_files import matching_clips
@@ -48,6 +51,33 @@ def test_a_command_to_stand_stays(database: MatchingDatabase) -> None:
     motion = match_motion(database, lambda t: Command(), 5.0, start=(7, 10))
     gone = np.linalg.norm(motion.clip.root[-1, :2] - motion.clip.root[90, :2])
     assert gone < 0.3
+
+
+@pytest.fixture(scope="module")
+def walks() -> MatchingDatabase:
+    """The packaged clips and the walk, as `poise motion match` has them."""
+    names = [*packaged_clips(), *walking_clips()]
+    return MatchingDatabase([read_bvh(find_bvh(name)).clip for name in names])
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.5, 0.8, 1.2])
+def test_commands_within_the_clips_are_followed(walks: MatchingDatabase, speed: float) -> None:
+    """From standing to 0.85 and more of what is commanded, straight ahead."""
+    motion = match_motion(walks, lambda t: Command(speed if t >= 1.0 else 0.0), 10.0, start=(5, 0))
+    first = round(2.0 / motion.clip.dt)
+    gone = motion.clip.root[-1, :2] - motion.clip.root[first, :2]
+    reached = np.linalg.norm(gone) / (8.0 * speed)
+    assert 0.85 <= reached <= 1.15
+    assert abs(np.arctan2(gone[1], gone[0])) < 0.35  # hips that sway do not turn the way
+
+
+@pytest.mark.parametrize("turning", [0.4, -0.4])
+def test_curves_are_followed(walks: MatchingDatabase, turning: float) -> None:
+    command = Command(0.7, turning=turning)
+    motion = match_motion(walks, lambda t: command if t >= 1.0 else Command(), 10.0, start=(5, 0))
+    heading = steady_heading(motion.clip)
+    first = round(2.0 / motion.clip.dt)
+    assert (heading[-1] - heading[first]) / 8.0 == pytest.approx(turning, rel=0.2)
 
 
 def changes_of(clip: Clip) -> np.ndarray:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyparsing as pp
 import pytest
 
-from poise.baselines.motion.synthesis.scripts.library import find_script
+from poise.baselines.motion.synthesis.scripts.library import find_script, names_script
 from poise.baselines.motion.synthesis.scripts.parser import parse, read_script
 from poise.baselines.motion.synthesis.scripts.printer import plain, table_of, text_of, to_csv
+from poise.baselines.motion.synthesis.scripts.table import read_table, text_of_table
 from poise.baselines.motion.synthesis.scripts.tree import (
     Arrow,
     ClipName,
@@ -268,3 +270,33 @@ def test_scripts_in_files(tmp_path) -> None:
 def test_the_clips_of_a_script_are_known_by_name() -> None:
     script = parse('both = (kick | "a b" on arms) * 2; <up> -> both -> (walk[0:1] -> stand) @ 2')
     assert clip_names(script) == {"kick", "a b", "both", "walk", "stand"}
+
+
+def test_a_table_is_read_back_and_may_be_edited(tmp_path: Path) -> None:
+    """Of 200 random scripts the table is the script; a cell that is changed changes its term, a row
+    that is added happens at once, a column that is added comes next."""
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        script = plain(random_script(rng))
+        assert parse(text_of_table(table_of(script))) == script
+    file = tmp_path / "edited.csv"
+    file.write_text(to_csv(parse("squat -> (punch | wave on left_arm)")))
+    assert read_table(file) == plain(parse("squat -> (punch | wave on left_arm)"))
+    file.write_text(",->,->{cross}\nbow,punch,stand\n,wave on left_arm,\n")
+    assert find_script(str(file)) == parse("bow -> punch | wave on left_arm ->{cross} stand")
+    for text, words in (
+        (",->\nbow\n", "column 2 has not a term"),
+        ("bow,punch\n", "row of arrows"),
+    ):
+        file.write_text(text)
+        with pytest.raises(ConfigError, match=words):
+            read_table(file)
+
+
+def test_a_csv_of_numbers_is_a_clip(tmp_path) -> None:
+    """A table of a script begins with an arrow or a term, a clip of postures with a number."""
+    table, clip = tmp_path / "script.csv", tmp_path / "clip.csv"
+    table.write_text(",->\nstand,walk\n", encoding="utf-8")
+    clip.write_text("-0.013,0.2,0.79\n", encoding="utf-8")
+    assert names_script(str(table)) and not names_script(str(clip))
+    assert names_script(str(tmp_path / "missing.csv"))  # the reader says that it is not there

@@ -1,0 +1,1 @@
+"""What steps a simulated robot: MuJoCo, or another engine on the same arrays."""

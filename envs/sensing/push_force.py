@@ -1,0 +1,73 @@
+"""The horizontal force that pushes a robot, from its CoM and its CoP alone.
+
+The linear inverted pendulum is off by what else pushes it [Stephens07]:
+
+    F = m c̈ − (W/h) (c − p),    W = m g − load
+
+c, ċ and p are those of the state that a controller reads, so that nothing is known here that a
+robot does not measure. c̈ is the difference of ċ over a tick. F is that of a force at the height of
+the CoM: one higher up counts by the moment that it has about the ground, F z/h. What the body's
+angular momentum changes by, L̇/h, is in F as well, but its mean over a recovery is zero.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from poise.envs.compiled.block import Block, Integer, Number
+from poise.envs.compiled.jit import compiled
+from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.kinematics import StateArrays, borne_weight
+
+SMOOTHING = 0.7  # [1/ω] τ of the estimate, unless a controller has its own
+MEMORY = 20.0  # [1/ω] T of its mean, likewise
+SUPPORTED = 0.1  # [m g] of the ground's force, below which there is no CoP to go by
+
+
+@dataclass(frozen=True, eq=False)
+class PushForce(Block):
+    """The estimated force, world axes, and the mean of it over the last seconds."""
+
+    smoothing: float  # τ of the low-pass [s]
+    memory: float  # T of the leaky mean [s]
+    force: Annotated[np.ndarray, 2]  # F̂ [N]
+    mean: Annotated[np.ndarray, 2]  # F̄ [N]
+    size: Number  # the leaky mean of |F̂| [N]
+    com_vel: Annotated[np.ndarray, 2]  # of the last tick [m/s]
+    begun: Integer  # 1 once there was a tick
+
+
+def push_force(omega: float, smoothing: float = SMOOTHING, memory: float = MEMORY) -> PushForce:
+    """An estimate that has seen nothing; times in 1/ω, `omega` ω [1/s]."""
+    return PushForce.allocate(smoothing=smoothing / omega, memory=memory / omega)
+
+
+def forget_pushes(b: PushForce) -> None:
+    """Start an episode, in which nothing has pushed yet."""
+    for array in (b.force, b.mean, b.size, b.begun):
+        array[:] = 0
+
+
+@compiled
+def observe_push(b: PushForce, robot: RobotArrays, s: StateArrays, dt: float) -> None:
+    """Update the force and its mean by a state that is `dt` [s] later than the last one:
+
+    F̂ ← F̂ + dt/(τ + dt) (F − F̂),    F̄ ← F̄ + dt/(T + dt) (F̂ − F̄)
+
+    Without support there is no CoP, and both stay as they are.
+    """
+    weight = borne_weight(robot, s)
+    if b.begun[0] and s.contact_wrench[2] > SUPPORTED * weight:
+        stiffness = weight / max(s.com[2] - s.origin[2], 0.2 * robot.height_com)
+        rate, leak = dt / (b.smoothing + dt), dt / (b.memory + dt)
+        for a in range(2):
+            inertial = robot.mass * (s.com_vel[a] - b.com_vel[a]) / dt
+            force = inertial - stiffness * (s.com[a] - s.cop[a])
+            b.force[a] += rate * (force - b.force[a])
+            b.mean[a] += leak * (b.force[a] - b.mean[a])
+        size = np.sqrt(b.force[0] * b.force[0] + b.force[1] * b.force[1])
+        b.size[0] += leak * (size - b.size[0])
+    for a in range(2):
+        b.com_vel[a] = s.com_vel[a]
+    b.begun[0] = 1

@@ -1,0 +1,1 @@
+"""The rows of docs/seeds.yaml: `python -m tests.seeds` runs them, `--write` makes docs/seeds.md."""
