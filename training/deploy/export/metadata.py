@@ -25,6 +25,7 @@ IDS = {
     "whole": "poise/ResidualWhole-v0",
     "torque": "poise/TorqueBalance-v0",
     "position": "poise/PositionBalance-v0",
+    "velocity": "poise/Velocity-v0",
 }
 UNITS = {  # of what an entry of the action moves
     **{"com": "m", "cop": "m", "lean": "rad", "momentum": "m h² ω"},

@@ -35,6 +35,7 @@ MOVES = {
     "whole": "servos that take over",
     "torque": "all torques",
     "position": "all joints' servos",
+    "velocity": "all joints' servos, as commanded",
 }
 
 
@@ -78,7 +79,7 @@ def _named(kind: str, name: str, known: dict[str, dict[str, Any]]) -> Named:
         robots = [config["robot"]] if config["robot"] in robots else []
         entry |= {"robot": config["robot"], "action": MOVES[config["action"]]}
         entry["about"] = known["policies"].get(name, "")
-        if config["action"] not in ("torque", "position"):
+        if config["action"] not in ("torque", "position", "velocity"):
             entry["on"] = config["controller"]
     else:
         entry["about"] = first_comment(packaged_folder(kind) / f"{name}.yaml")

@@ -62,7 +62,7 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     with pytest.raises(
         ConfigError,
         match="momentum-qp, .*residual-walk, residual-walk-fast, residual-walk-field, "
-        "residual-whole-g1, residual-whole-g1-field, guard-falcon-g1, guard-g1, zero",
+        "residual-whole-g1, residual-whole-g1-field, velocity-g1, guard-falcon-g1, guard-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
@@ -94,10 +94,10 @@ def test_a_packaged_policy_is_known_by_its_folder(
     names = ["ppo-position", "ppo-torque", "residual", "residual-lqr-lip", "residual-pd"]
     names += ["residual-step", "residual-torque", "residual-torque-field"]
     others = ["residual-walk", "residual-walk-fast", "residual-walk-field"]
-    others += [f"residual-whole-g1{where}" for where in ("", "-field")]
+    others += [*(f"residual-whole-g1{where}" for where in ("", "-field")), "velocity-g1"]
     assert packaged("policies") == [*names, *others]
     assert default_controllers()[-8:] == tuple(names)
-    assert default_controllers("unitree_g1")[-2:] == tuple(others[3:])
+    assert default_controllers("unitree_g1")[-3:] == tuple(others[3:])
     guards = packaged("guards")
     with pytest.raises(ConfigError, match=", ".join([*names, *others, *guards, "zero"])):
         load_agent("residual-abe07", robot)
