@@ -59,7 +59,6 @@ MEANT = {
     "docs/leaderboard-booster_t1.md": ("of the mix",),
     "docs/leaderboard-unitree_g1.md": ("of the mix",),
     "docs/leaderboard-unitree_h1.md": ("of the mix",),
-    "docs/walking-leaderboard.md": ("as told, unpushed",),
 }
 
 #: names that stand for a file of the reader
