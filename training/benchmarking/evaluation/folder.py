@@ -32,7 +32,7 @@ Key = tuple[str, int]  # controller, number of the trial
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything that decides a result, but for the machine."""
+    """Everything that determines a result, except the machine."""
 
     format: int  #: of the folder
     suite_name: str  #: as the user wrote it
@@ -48,10 +48,10 @@ class Settings:
 
 
 class ResultFolder:
-    """Opens a new, an interrupted or a finished result.
+    """Open a new, an interrupted or a finished result.
 
-    `finished` holds the outcomes that were there, by controller and number; `settings` the given
-    ones, with the controllers that the folder has besides; `damaged` counts unreadable lines.
+    `finished` holds the outcomes found in the folder by controller and number, `settings` the given
+    ones with the folder's other controllers, `damaged` the number of unreadable lines.
 
     Args:
         path: the folder; made if missing.

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.training.benchmarking.metrics.played import (
+from poise.training.benchmarking.metrics.evaluated import (
     DIRECTIONAL,
-    Played,
+    Evaluated,
     ankle_limits,
     by_falls,
     fractions,
@@ -43,22 +43,22 @@ FEWEST = 5  # trials of a direction whose J50 is drawn
 def draw_plots(
     folder: Path,
     plan: Plan,
-    played: Mapping[str, Played],
+    evaluated: Mapping[str, Evaluated],
     steps: Mapping[str, NStepLimit] | None = None,
     timesteps: Mapping[str, int | None] | None = None,
 ) -> list[Path]:
-    """Write the plots of a result; returns their paths, none without pushes that have a limit.
+    """Write the plots of a result; return their paths, none without pushes that have a limit.
 
-    Where J50 of directions is measured, they show what `steps` of the first controller that steps
-    could stop; else, the random pushes. Of the policies that a run has kept, J50 is also drawn over
-    the `timesteps` that they have learned from.
+    Plots of J50 by direction include the N-step limits of the first stepping controller; otherwise
+    the random pushes are shown. For several checkpoints of a training run, J50 is also plotted
+    over `timesteps`.
     """
     polar, fall = (folder / name for name in PLOTS)
     limits = plan.limits
-    shown = {name: part(own, *DIRECTIONAL) for name, own in played.items()}
+    shown = {name: part(own, *DIRECTIONAL) for name, own in evaluated.items()}
     directional = all(shown.values())
     if not directional:
-        shown = {name: part(own, "random") for name, own in played.items()}
+        shown = {name: part(own, "random") for name, own in evaluated.items()}
         if not all(shown.values()):
             return []
     label = "push impulse, as a fraction of the ankle limit"

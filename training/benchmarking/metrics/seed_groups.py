@@ -20,7 +20,7 @@ def seed_groups(names: Sequence[str], entries: Mapping[str, Entry]) -> list[Seed
     """Interquartile means over the seeds of every configuration that has several run folders.
 
     `entries` are those of a summary. The scores of η are those of every direction (the tasks);
-    J50's mean and the recovered rate are one task each. The seeds are drawn anew for every task
+    J50's mean and the recovered rate are one task each. Seeds are resampled for every task
     [Agarwal21]. Checkpoints of one run, which share a seed, are no sample of seeds: a
     configuration with two of the same is left out.
     """

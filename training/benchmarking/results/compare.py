@@ -136,7 +136,7 @@ def _changes(name: str, a: Results, b: Results) -> Iterator[Change]:
         rated = a.summary["rated"]
         walked = one.get("criterion") == two.get("criterion") == "not fallen"
         for figure in (NOT_FALLEN, AS_COMMANDED) if walked else (RECOVERED, NOT_FALLEN):
-            title = f"{figure.name} of the {rated}" if rated else figure.name
+            title = f"{figure.name}, {rated}" if rated else figure.name
             yield from _rates(name, title, figure, one, two, a, b, part=rated)
     for (factor, level), before, after in _levels(one, two):
         title = f"{factor} {level}"
@@ -173,8 +173,11 @@ def _rates(
     *,
     part: str | None = None,
 ) -> Iterator[Change]:
-    """The rate of recovered trials, or of those without a fall: in pairs if both played the same
-    trials, else by intervals; none where an older result does not have it."""
+    """Yield the change of the recovered rate, or of that without a fall.
+
+    It is paired where both results have the same trials, else by intervals; none where an older
+    result lacks the rate.
+    """
     before, after = figure.value(one), figure.value(two)
     if before is None or after is None:
         return

@@ -37,7 +37,7 @@ from .walking_leaderboard import is_of_walks, walking_leaderboard
 
 PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard.md")
 SCENARIO_PAGE = Path("docs/scenarios.md")
-COLUMNS = {"recovered of the mix", *IN_PAIRS, *(each.heading for each in (
+COLUMNS = {"recovered, mix", *IN_PAIRS, *(each.heading for each in (
     J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, NOT_FALLEN, ROOT, TICK))}  # fmt: skip
 SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
 (ETA,) = (each for each in AIMED if each.key == "eta")
@@ -137,7 +137,7 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
 
 
 def _angles(summary: Summary) -> set[float]:
-    """Directions in which the ankle limit is told [deg]."""
+    """Return the directions in which the ankle limit is listed [deg]."""
     return {angle for angle, _ in summary["robot"]["ankle_limit"]}
 
 
@@ -175,8 +175,8 @@ def _ranking(summary: Summary) -> Table:
 
 
 def _realism(entry: Entry) -> Iterator[tuple[str, str]]:
-    """Heading and cell of each level of realism, the suite's own first: what was recovered of the
-    same pushes, and J50 there."""
+    """Yield heading and cell of each realism level, the suite's own first: the recovered rate of
+    the same pushes, and J50."""
     for factor in entry.get("factors", ()):
         levels = factor["levels"] if factor["factor"] == "realism" else []
         for level in sorted(levels, key=lambda each: not each["standard"]):

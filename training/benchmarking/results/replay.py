@@ -1,4 +1,4 @@
-"""Playing one trial of a result again, exactly, from its folder, and filming it."""
+"""Repeat one trial of a result exactly, from its folder, and film it."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -29,11 +29,11 @@ NARROW = (480, 480)  # [pixels] of one of several
 
 @dataclass(frozen=True)
 class Replay:
-    """A trial played again."""
+    """A repeated trial."""
 
     trial: Trial
-    controller: str  #: who played it
-    outcome: Outcome  #: of now
+    controller: str  #: its name
+    outcome: Outcome  #: of the repetition
     #: column of trials.csv → (recorded, now), for those that differ
     differences: dict[str, tuple[str, str]]
 
@@ -48,7 +48,7 @@ def replay(
     watch: Callable[[BalanceEnv], object] | None = None,
     allow: str | Iterable[str] = (),
 ) -> Replay:
-    """Play a trial of a result again and compare it with what was recorded.
+    """Repeat a trial of a result and compare it with the record.
 
     Args:
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
@@ -102,13 +102,13 @@ def film(
     size: tuple[int, int] | None = None,
     allow: str | Iterable[str] = (),
 ) -> None:
-    """Play a trial of a result again with some controllers and film them side by side.
+    """Repeat a trial of a result with several controllers and film them side by side.
 
     The camera stands beside the first push (`beside`).
 
     Args:
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
-        trial: its number in trials.csv; all of `controllers` have played it.
+        trial: its number in trials.csv, in the results of all `controllers`.
         controllers: names, from left to right.
         path: of the video, ending in .mp4 or .webp.
         fps: frames a second that are wanted [1/s]; None: as of `record`.

@@ -67,19 +67,19 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         commands={command: _walks(entries, names, command) for command in commands},
         heading=J50.heading,
         directions=direction_table(entries, names, OF_DIRECTION),
-        played=[(summary, [name for name in summary["controllers"] if origin[name] == source])
+        results=[(summary, [name for name in summary["controllers"] if origin[name] == source])
                 for source, summary in summaries.items()],
     )  # fmt: skip
 
 
 def _pushed(entries: Mapping[str, Entry]) -> str:
-    """What J50 is of, in a sentence: the command of the walks, and how long a push takes, as far as
-    the results say it."""
-    told = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
+    """Return a sentence on the pushes of J50: the command of the walks and the duration of a push,
+    as far as the results have them."""
+    commands = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
     known = {name: each["push_duration"] for name, each in entries.items()
              if "push_duration" in each}  # fmt: skip
     text = "J50 is of pushes while it walks" + (
-        f" ({plain(', '.join(sorted(told)))})" if told else ""
+        f" ({plain(', '.join(sorted(commands)))})" if commands else ""
     )
     for duration in sorted(set(known.values())):
         names = [code(name) for name, its in known.items() if its == duration]
@@ -119,12 +119,12 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
         fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)
-        told, minutes = sum(w["recovered"] for w in walks), sum(w["minutes"] for w in walks)
+        followed, minutes = sum(w["recovered"] for w in walks), sum(w["minutes"] for w in walks)
         low, high = poisson_interval(fallen)
         rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
                 if minutes else NONE)  # fmt: skip
         rows.append([str(rank[name] or NONE), code(name), *_j50(entry), *_pushes(entry),
-                     f"{fallen} of {trials}", rate, f"{told} of {trials}"])  # fmt: skip
+                     f"{fallen} of {trials}", rate, f"{followed} of {trials}"])  # fmt: skip
     return head, rows
 
 

@@ -15,7 +15,8 @@ def difference(
 ) -> tuple[float, Interval]:
     """b − a and its interval, from those of a and b [Zou08], "MOVER".
 
-        low  = (b − a) − √((b − b_l)² + (a_u − a)² − 2 ρ (b − b_l)(a_u − a)),   high likewise
+        low  = (b − a) − √((b − b_l)² + (a_u − a)² − 2 ρ (b − b_l)(a_u − a))
+        high = (b − a) + √((b_u − b)² + (a − a_l)² − 2 ρ (b_u − b)(a − a_l))
 
     With Wilson intervals of two proportions this is Newcombe's method 10 [Newcombe98].
 

@@ -1,4 +1,4 @@
-"""Trials are drawn here: every draw depends on the seed and the trial's number alone."""
+"""Sampling of trials, which depends only on the seed and the trial's number."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Conditions, Trial
 
 T = TypeVar("T")
-MOST_TRIALS = 100_000  # all are drawn before the first is played
+MOST_TRIALS = 100_000  # all are sampled before the first one runs
 Recovered = Mapping[str, Sequence[bool]]  # controller → outcome of each trial of the first stage
 
 
@@ -63,7 +63,7 @@ class Draw:
 
     Attributes:
         standard: what the suite's parts share.
-        limits: what pushes are measured by.
+        limits: reference impulses of pushes.
         seed: of the suite.
         bodies: that are pushed; the first one by the standard push.
         motions: name → duration [s] of the motions that are performed.
@@ -151,7 +151,7 @@ class Part:
         raise NotImplementedError
 
     def second_count(self, controllers: int) -> int:
-        """The number of trials that each controller meets in the second stage."""
+        """Return the number of trials of each controller in the second stage."""
         return 0
 
     def second(

@@ -17,7 +17,7 @@ STANDARD = "standard"  # factor and level of the case that levels are compared w
 
 @dataclass(frozen=True)
 class Levels:
-    """Levels of every factor, besides the standard case's own; none: it is not varied."""
+    """Levels of every factor in addition to that of the standard case; none: it is not varied."""
 
     duration: tuple[float, ...] = field(default=(), metadata={"above": 0.0})  # [s]
     body: bool = False  # every body that the robot's description names

@@ -30,11 +30,11 @@ def label(name: str) -> str:
 class Motions(Part):
     """Every motion × share of J50 × direction, `trials` times, at a random time of the motion.
 
-    A name is that of a packaged clip, which is put on the robot first, of a packaged motion, or of
-    a file. J50 is the controller's own: that of the file of limits where it is this controller's,
-    else what `standing` finds in the first stage, in which the robot stands. With `of: limits` it
-    is that of the file for all controllers, who then meet the same pushes; nothing is played
-    first. Start, direction and time of a trial are the same for all controllers and shares.
+    A name is that of a packaged clip, which is retargeted to the robot first, of a packaged motion,
+    or of a file. J50 is the controller's own: that of the file of limits if it is of this
+    controller, else that of a first stage in which the robot stands. With `of: limits` it is that
+    of the file for all controllers, so all have the same pushes and no first stage. Start,
+    direction and time of a trial are the same for all controllers and shares.
     """
 
     names: tuple[str, ...] = tuple(f"humanoid_{clip}" for clip in CLIPS)
@@ -56,7 +56,7 @@ class Motions(Part):
             if twice := [value for value, n in Counter(values).items() if n > 1]:
                 raise ValueError(f"{name}: {twice[0]} comes twice")
         if STANDING in self.labels:
-            raise ValueError(f"names: {STANDING} is played by itself")
+            raise ValueError(f"names: {STANDING} is always included")
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from .factors import standard_levels
 from .scenarios import PART as SCENARIOS
 from .suite import Suite
 
-LEVEL = "@"  # between the name of a part and the level that it is played at again
+LEVEL = "@"  # between the name of a part and the realism level at which it is repeated
 Finished = Mapping[tuple[str, int], Outcome]  # controller, number of the trial → outcome
 
 
@@ -35,11 +35,11 @@ class Plan:
 
     Attributes:
         suite: whose trials they are.
-        limits: what pushes are measured by.
+        limits: reference impulses of pushes.
         names: of the controllers.
         motions: name → duration [s] of the motions that are performed.
-        standing: of `names` those that do not walk, and play no scenario in which one does.
-        first: trials of the first stage, which all controllers play but for that.
+        standing: those of `names` that do not walk, and so skip scenarios with a command.
+        first: trials of the first stage, the same for all controllers except these scenarios.
         standard: factor → level of the standard case, as text; empty without factors.
         count: trials of all stages and controllers.
     """
@@ -78,7 +78,7 @@ class Plan:
             check_limbs(load_realism(real), limits.robot)
 
     def plays(self, name: str, trial: Trial) -> bool:
-        """Whether the controller of this name plays a trial of the first stage."""
+        """Return whether the controller of this name runs a trial of the first stage."""
         return name not in self._standing or not trial.commands
 
     def _at(self, name: str, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
@@ -136,5 +136,5 @@ class Plan:
 
 
 def at_level(part: str, level: str) -> str:
-    """The name of a part that is played again at a level, such as envelope@field."""
+    """Return the name of a part repeated at a realism level, such as envelope@field."""
     return f"{part}{LEVEL}{Path(level).stem}"

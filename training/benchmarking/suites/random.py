@@ -48,9 +48,9 @@ class Sequence(Part):
 
     `pushes.count` of them at most. The impulse of all but the first is multiplied by a number
     drawn from `later`. Without `bodies` the robot's first push body is pushed; a magnitude in
-    controller_fraction is one of `--limits`, which may be a controller's own, or of what ankles
-    hold where no J50 of the robot was measured. `limit_fraction` is left out: no single push
-    decides a trial.
+    controller_fraction is a fraction of `--limits`, which may be a controller's own, or of the
+    ankle limit if the robot has no measured J50. `limit_fraction` is empty: no single push decides
+    a trial.
     """
 
     trials: int = field(default=50, metadata={"min": 1, "max": MOST_TRIALS})

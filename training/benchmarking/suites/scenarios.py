@@ -27,7 +27,7 @@ class Scenario:
     trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})
     pushes: PushSampler | None = None
     later: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})  # times all but the first push
-    command: GaitCommand | None = None  # only who walks plays it
+    command: GaitCommand | None = None  # for controllers that walk
     realism: str = IDEAL  # a level or a file of one
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Parts for controllers that walk: how they follow commands, on what, and what pushes them off.
+"""Parts for controllers that walk: commands, terrains, pushes and kicks.
 
 A trial depends on the seed and its number alone, as in all parts. Pushes and kicks begin at a time
 that goes through the phases of the gait evenly from trial to trial (the golden ratio's fractions),
@@ -38,8 +38,8 @@ def command_text(command: GaitCommand) -> str:
     return ", ".join(said) or "stand"
 
 
-def told(command: GaitCommand) -> dict[str, Any]:
-    """The fields of a trial in which this command holds all the time."""
+def commanded(command: GaitCommand) -> dict[str, Any]:
+    """Return the fields of a trial with this command from start to end."""
     return {"level": command_text(command), "commands": (from_start(command),)}
 
 
@@ -56,12 +56,12 @@ class Walk(Part):
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         each = repeated(self.commands, self.trials, number)
-        return [draw.trial(k, **told(command)) for k, command in each]
+        return [draw.trial(k, **commanded(command)) for k, command in each]
 
 
 @dataclass(frozen=True)
 class Gait(Walk):
-    """The same for commands with step parameters: whether the steps are as told."""
+    """The same for commands with step parameters, which the steps are compared with."""
 
     commands: tuple[GaitCommand, ...] = (GaitCommand(0.5, step_length=0.2),)
 
@@ -106,7 +106,7 @@ class Walking:
         """The trials with this command, their only push at its time."""
         return [
             replace(
-                trial, **told(self.command),
+                trial, **commanded(self.command),
                 pushes=tuple(replace(p, start=self.begins(draw, trial.number))
                              for p in trial.pushes),
             )
@@ -172,7 +172,7 @@ class WalkRepeated(PushSequence):
     command: GaitCommand = field(default_factory=lambda: GaitCommand(0.5))
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        return [replace(trial, **told(self.command)) for trial in super().first(draw, number)]
+        return [replace(trial, **commanded(self.command)) for trial in super().first(draw, number)]
 
 
 #: parts of a suite for controllers that walk

@@ -1,4 +1,4 @@
-"""Agents are evaluated: a controller by its name, ready to act in its own environment."""
+"""Agents: a controller by its name, ready to act in its own environment."""
 
 import contextlib
 import hashlib
@@ -49,7 +49,7 @@ from .names import NO_CONTROL, check_name
 
 @dataclass(frozen=True, eq=False)
 class Agent:
-    """A name, an environment, and what to do in it."""
+    """A name, an environment, and the actions in it."""
 
     name: str  #: as the user wrote it
     env: BalanceEnv  #: the environment it acts in
@@ -61,15 +61,15 @@ class Agent:
 
 
 def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
-    """An agent from the name of a controller.
+    """Return an agent from the name of a controller.
 
     Args:
-        name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
+        name: a packaged controller or a path to a ``.yaml`` of one (run with action zero),
             a packaged policy (``residual``), ``zero`` (no torque at all), a folder written by
             ``poise train``, a policy from outside (an ONNX file, or a folder with a
             ``deploy.yaml``), ``module:Class`` or ``file.py:Class`` of a controller or a policy, or
             a guard (a packaged one or its ``.yaml``).
-        robot: who is controlled. A policy must have been trained on it.
+        robot: that is controlled. A policy must have been trained on it.
         overrides: arguments of the environment, or fields of its `EnvConfig`.
 
     Raises:
@@ -218,7 +218,7 @@ def _guarded(name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, o
     return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
 
 
-# fields of a training configuration that do not change how its policy plays
+# fields of a training configuration that do not affect its policy's actions
 TRAINING = (
     *("seed", "steps", "threads", "keep_every", "physics_step", "start_from"),
     *("ppo", "curriculum", "evaluation"),

@@ -11,10 +11,10 @@ from poise.envs.compiled.maths.runs import runs_of
 
 from .gait_record import WalkArrays, step_error, steps_of
 
-AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
+SWING_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
 SPEED_TOLERANCE, TURN_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad/s] beyond its own error
-FALLING = 1.0  # [s] before a fall, in which strides tell of the fall
+FALLING = 1.0  # [s] before a fall, in which strides are part of the fall
 STOPPED = 1.0  # [s] without a touchdown, after which a robot does not walk any more
 SLOW = 0.1  # [m/s] below which a cost of transport says nothing
 WINDOW = 4  # steps, two strides, by which the end of a walk is judged
@@ -38,20 +38,20 @@ class Touchdowns(NamedTuple):
 
 
 def touchdowns(record: WalkArrays) -> Touchdowns:
-    """Touchdowns of feet that were in the air for 0.08 s."""
+    """Return touchdowns after a swing of 0.08 s or more."""
     found: list[tuple[int, int]] = []
     for foot in range(record.down.shape[1]):
         for lifted, landed in runs_of(~record.down[:, foot]).tolist():
             if lifted == 0 or landed == len(record.time):  # it has not lifted off, or not landed
                 continue
-            if record.time[landed] - record.time[lifted] >= AIR_TIME - 1e-9:
+            if record.time[landed] - record.time[lifted] >= SWING_TIME - 1e-9:
                 found.append((landed, foot))
     rows = np.array(sorted(found), dtype=int).reshape(-1, 2)
     return Touchdowns(rows[:, 0], rows[:, 1])
 
 
 class Walk:
-    """A recorded walk and the commands that it was to follow.
+    """A recorded walk and its commands.
 
     Velocities are means over a stride, two steps from touchdown to touchdown, of the CoM along the
     mean heading of that stride.
@@ -221,7 +221,7 @@ class Walk:
         }
 
     def _slide(self) -> float | None:
-        """Largest way of a sole on the ground while the other one is in the air [m]."""
+        """Return the largest displacement of a stance sole in single support [m]."""
         r, worst = self.record, 0.0
         for foot in range(r.down.shape[1]):
             alone = self._known & r.down[:, foot] & (r.down.sum(axis=1) == 1)

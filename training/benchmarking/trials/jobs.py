@@ -1,4 +1,4 @@
-"""Jobs tell a process what to play, and `play` plays it."""
+"""Jobs for worker processes, run by `play`."""
 
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -29,7 +29,7 @@ class Stage:
     #: name and file (or packaged name) of each motion that trials perform; falls are relative to
     #: these then
     motions: tuple[tuple[str, str], ...] = ()
-    tempo: Tempo = field(default_factory=Tempo)  #: at which they are played
+    tempo: Tempo = field(default_factory=Tempo)  #: of the motions
     #: time after a fall in which the robot may get up [s]; None: a fall ends the trial
     get_up: float | None = None
     physics: str = MUJOCO  #: engine that steps the robot, by its name or file
@@ -65,9 +65,9 @@ class Job:
 
 
 def play(job: Job) -> Outcome:
-    """Play a job; what the controller raises while it plays becomes the outcome's `error`.
+    """Run a job; an exception of the controller in the trial becomes the outcome's `error`.
 
-    Raises PoiseError when the controller cannot be loaded here: that is no trial.
+    Raises PoiseError when the controller cannot be loaded here.
     """
     variants = _loaded(job.stage, job.controller)
     motion = _motion(job.stage, job.trial.motion)

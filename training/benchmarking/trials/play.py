@@ -1,4 +1,4 @@
-"""Playing one trial: the outcome depends on the trial and the agent alone, bit for bit."""
+"""Run one trial: its outcome depends bit for bit on the trial and the agent alone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from poise.training.benchmarking.diagnosis.record import CourseRecord, swing_of
 from poise.training.motion.tracking.record import Tracking
 
 from .agents import Agent
-from .gait_figures import AIR_TIME, NO_ERROR, TrackingError, Walk, near
+from .gait_figures import NO_ERROR, SWING_TIME, TrackingError, Walk, near
 from .gait_record import WalkRecord
 from .rising import Rise, Rising
 from .signals import Sway
@@ -75,7 +75,7 @@ class SteppedTrial:
 
 
 def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
-    """Play a trial to its end in the environment that the agent has."""
+    """Run a trial to its end in the agent's environment."""
     env, stepped = agent.env, SteppedTrial(agent, trial)
     if trial.start is not None:
         return rise_trial(env, trial, stepped, watch)
@@ -204,8 +204,9 @@ def left_command(trial: Trial, outcome: Outcome) -> bool:
 
 
 def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
-    """The outcome of a walk that had no settled stride before its push: it is compared with the
-    same trial without the push, which is played for that.
+    """Return the outcome of a walk without a settled stride before its push.
+
+    It is compared with the same trial without the push, which runs in addition.
     """
     assert outcome.last_speed_error is not None and outcome.last_turn_error is not None
     last = TrackingError(outcome.last_speed_error, outcome.last_turn_error)
@@ -321,9 +322,9 @@ def _finite(value: float) -> float | None:
 
 
 class Touchdowns:
-    """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
+    """Count touchdowns after a swing of at least `SWING_TIME`.
 
-    Where the controller has a plan, those alone that it planned: a foot that it swung meanwhile.
+    Where the controller has a plan, only its planned steps count.
 
     Args:
         feet: number of feet.
@@ -332,8 +333,8 @@ class Touchdowns:
 
     def __init__(self, feet: int, period: float):
         self.count = 0
-        self._least = max(round(AIR_TIME / period), 1)
-        self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
+        self._least = max(round(SWING_TIME / period), 1)
+        self._swing = np.zeros(feet, dtype=int)  # updates in a row without contact
         self._planned = np.zeros(feet, dtype=bool)  # whether the foot swung by plan in these
 
     def update(self, contacts: np.ndarray, swinging: int | None = None) -> None:
@@ -341,6 +342,6 @@ class Touchdowns:
         down = contacts > 0.5
         swung = swinging is None or np.arange(len(down)) == swinging
         self._planned |= ~down & swung
-        self.count += int(np.sum(down & self._planned & (self._air >= self._least)))
+        self.count += int(np.sum(down & self._planned & (self._swing >= self._least)))
         self._planned &= ~down
-        self._air = np.where(down, 0, self._air + 1)
+        self._swing = np.where(down, 0, self._swing + 1)

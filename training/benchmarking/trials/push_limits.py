@@ -1,4 +1,4 @@
-"""The size of a push for a robot: over what its ankles hold, and over what its baseline holds."""
+"""The size of a push relative to a robot's ankle limit and to its baseline's J50."""
 
 import shlex
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ class PushLimits:
         return self.table
 
     def ankle(self, direction: float, duration: float) -> float:
-        """Impulse J [N·s] of a square push that the ankles alone hold."""
+        """Return the ankle limit: the largest impulse J [N·s] of a square push."""
         return self.robot.mass * ankle_limit(self.omega, self.margin(direction), duration)
 
     def fraction(self, push: Push) -> float:

@@ -30,7 +30,7 @@ class NStepLimit:
 
     In each direction: r is how far the CoP can be brought from the CoM, by both soles with the
     torques of their ankles; l how far a foot gets in one step of the shortest time T_s, by
-    `steps`. An upper bound: it knows neither legs that must not cross nor the CoM's height.
+    `steps`. An upper bound: it ignores collisions of the legs and the CoM's height.
     """
 
     def __init__(self, limits: PushLimits, steps: StepLimits | None = None):

@@ -31,7 +31,7 @@ OUTCOME_COLUMNS = tuple(
 COLUMNS = (*CASE_COLUMNS, *OUTCOME_COLUMNS)
 TEXTS = ("controller", "part", "factor", "level", "body", "profile", "realism", "motion")
 WHOLE = ("trial", "seed", "stage", "start_posture")
-FULL = ("trial", "seed", "stage", "delay", "mass_error")  # columns without empty cells
+REQUIRED = ("trial", "seed", "stage", "delay", "mass_error")  # columns without empty cells
 AS_JSON = ("later", "commands", "kicks", "terrain")  # of all other columns a cell is a number
 
 
@@ -57,8 +57,8 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
 
 
 def _many(items: Sequence[Any]) -> str | None:
-    told = [{k: v for k, v in asdict(item).items() if v is not None} for item in items]
-    return json.dumps(told) if told else None
+    fields = [{k: v for k, v in asdict(item).items() if v is not None} for item in items]
+    return json.dumps(fields) if fields else None
 
 
 def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
@@ -101,10 +101,13 @@ def _push_cells(push: Push | None) -> dict[str, Cell]:
 
 
 def read_trial(line: Mapping[str, str], path: Path) -> Trial:
-    """The trial of a line; raises ConfigError where it does not parse. A column that older results
-    lack is a field's default, and so is an empty cell, but for those of `FULL` and of a push."""
+    """Return the trial of a line; raise ConfigError where it does not parse.
+
+    A missing column of older results or an empty cell is the field's default, except for
+    `REQUIRED` and the columns of a push.
+    """
     try:
-        for name in (*FULL, *(PUSH_COLUMNS if line["body"] else ())):
+        for name in (*REQUIRED, *(PUSH_COLUMNS if line["body"] else ())):
             if not line[name]:
                 raise ValueError(f"{name} is empty")
         cells = {name: _read(name, line[name]) for name in CASE_COLUMNS if line.get(name)}

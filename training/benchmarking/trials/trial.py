@@ -1,4 +1,4 @@
-"""One trial: a start, the pushes, the conditions that they meet, and what became of it."""
+"""One trial: its start, pushes and conditions, and its outcome."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,27 +12,27 @@ from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis
 
 @dataclass(frozen=True)
 class Conditions:
-    """The difference of a trial's robot from the one that its controller knows."""
+    """The difference of a trial's robot from its controller's model."""
 
     friction: float | None = None  #: of floor and soles; None: the robot's own
     delay: float = 0.0  #: of the sensors [s]
-    mass_error: float = 0.0  #: by which all masses differ from those that the controller knows
+    mass_error: float = 0.0  #: relative error of all masses in the controller's model
     velocity_noise: float = 0.0  #: standard deviation of measured joint velocities [rad/s]
     #: name or file of a level, in which the other fields have the last word; None: ideal
     realism: str | None = None
 
 
-STANDARD_CONDITIONS = Conditions()  # the robot as its controller knows it
+STANDARD_CONDITIONS = Conditions()  # the robot as its controller models it
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial that controllers meet alike."""
+    """A trial, the same for all controllers."""
 
     number: int  #: within its suite
     seed: int  #: of the disturbed start
     pushes: tuple[Push, ...] = ()  #: one after the other; none where the robot only stands
-    conditions: Conditions = STANDARD_CONDITIONS  #: in which it is played
+    conditions: Conditions = STANDARD_CONDITIONS  #: of robot, ground and sensors
     #: impulse of the only push over its limit (see `PushLimits.scale`), of repeated ones of each
     limit_fraction: float | None = None
     part: str = ""  #: of the suite
@@ -43,7 +43,7 @@ class Trial:
     #: that a controller that walks follows, in the order of time; none: it stands
     commands: tuple[TimedCommand, ...] = ()
     kicks: tuple[Kick, ...] = ()  #: sudden changes of the root's velocity
-    terrain: Terrain | None = None  #: that it is played on; None: that of the environment
+    terrain: Terrain | None = None  #: None: that of the environment
     #: that is performed, by its name in the suite; None: that of the environment
     motion: str | None = None
     share: float | None = None  #: of the controller's J50 that the push is
@@ -96,8 +96,8 @@ class TrialFigures:
     recovery_time: float | None = None
     #: a foot moved more than 5 cm; the column `stepped` of trials.csv
     foot_displaced: bool = False
-    #: touchdowns of feet that were in the air for 0.08 s; of a controller that plans its steps, or
-    #: keeps its feet where they are, those that it planned
+    #: touchdowns after a swing of 0.08 s or more; of a controller that plans its steps, or keeps
+    #: its feet fixed, only planned ones
     steps: int = 0
     max_com: float | None = None  #: largest distance of the CoM from the soles' centre
     max_capture: float | None = None  #: the same of the capture point
@@ -106,10 +106,10 @@ class TrialFigures:
     energy: float | None = None  #: ∫ Σ |τ q̇| dt [J]
     peak_torque: float | None = None  #: largest |τ| over its limit
     saturation: float = 0.0  #: fraction of motors and ticks at the limit
-    mean_power: float | None = None  #: ∫ Σ |τ q̇| dt over the time that was played [W]
-    #: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors, over the time that
-    #: was played [1/s]. A torque that goes from one limit to the other and back once a second has
-    #: 4; one that hums has more
+    mean_power: float | None = None  #: ∫ Σ |τ q̇| dt over the duration of the trial [W]
+    #: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors, over the duration of
+    #: the trial [1/s]. A torque that goes from one limit to the other and back once a second has
+    #: 4; chattering torques have more
     torque_variation: float | None = None
     solver_failures: int = 0  #: ticks at which the QP was not solved
     mean_abs_action: float | None = None  #: mean |action| after the first second
@@ -119,7 +119,7 @@ class TrialFigures:
     foot_drift: float | None = None  #: the same of a sole
     final_speed: float | None = None  #: |ċ| at the end [m/s]
     final_lean: float | None = None  #: of the root from the described posture at the end [°]
-    #: largest force [N] that a soft root took from nowhere; 0 with a hard root
+    #: largest external force [N] of a soft root; 0 with a hard root
     root_force: float | None = None
     #: body sway [rad] of a recovered push, see `training/benchmarking/statistics/eurobench.py`
     sway: float | None = None
@@ -182,7 +182,7 @@ class TrialFigures:
     #: root within 30° of standing, the CoM at 0.8 of its height, only the feet on the ground
     up_again: bool | None = None
     up_time: float | None = None  #: from the fall, or the start on the ground, until it was up
-    #: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`
+    #: parameters of a randomised robot as JSON, see `DrawnRobot.summary`
     drawn: str | None = None
     #: what the controller raised, on one line; the trial then counts as not recovered
     error: str | None = None
@@ -202,8 +202,8 @@ class Outcome(Diagnosis, TrialFigures):
 
 
 def won(trial: Trial, outcome: Outcome) -> bool:
-    """What J50, rankings and pairs count: of a walk on level ground not to have fallen, of all else
-    to have recovered."""
+    """Return whether a trial counts as won in J50, rankings and pairs: a walk on level ground
+    without a fall, any other trial recovered."""
     return outcome.upright if trial.judged_by_falls else outcome.recovered
 
 

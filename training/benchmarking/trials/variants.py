@@ -16,9 +16,9 @@ from .trial import Conditions
 
 @cache
 def level_of(conditions: Conditions) -> Realism:
-    """The level of realism that conditions are: their own, with the single factors in it.
+    """Return the realism level of conditions: the named one, overridden by the single factors.
 
-    Raises ConfigError for a level that does not exist.
+    Raises ConfigError for an unknown level.
     """
     level = load_realism(conditions.realism)
     changed: dict[str, dict[str, Any]] = {}
@@ -53,8 +53,8 @@ class AgentVariants:
     ) -> Agent:
         """Return the agent, whose environment has these conditions from its next reset on.
 
-        `terrain` and `motion` take the place of the environment's own. Raises ConfigError for a
-        level of realism that does not exist.
+        `terrain` and `motion` replace those of the environment. Raises ConfigError for an unknown
+        realism level.
         """
         env = self.agent.env
         motion = motion or self._motion
