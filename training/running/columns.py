@@ -55,7 +55,7 @@ class Figure:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def value(self, entry: Entry) -> float | None:
-        """The figure in SI units; None where the entry has none."""
+        """Return the figure in SI units; None where the entry has none."""
         if self.where is not None and not self.where(entry):
             return None
         return cast("float | None", entry.get(self.key))

@@ -70,7 +70,7 @@ def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagno
 
 
 def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
-    """The criterion of `has_fallen` that is met, in the order in which it asks."""
+    """Return the first criterion of `has_fallen` that is met, in its order."""
     s, arrays = env.simulation.state_arrays, env.simulation.arrays
     if has_diverged(env.simulation.views):
         return Diagnosis("diverged")
@@ -84,7 +84,7 @@ def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
 
 
 def touching_body(env: BalanceEnv) -> str | None:
-    """The first body that is no foot and touches the ground."""
+    """Return the first body other than a foot that touches the ground."""
     model, data = env.model, env.data
     feet = {sole.body_id for sole in env.robot.soles}
     for contact in data.contact[: data.ncon]:
@@ -153,7 +153,7 @@ def distance_outside(polygon: np.ndarray, point: np.ndarray) -> float:
 
 
 def _foothold(course: Course, start: float) -> dict[str, Any]:
-    """The first sole after the first push that slipped, or that landed where it should not."""
+    """Return the first slip or missed foothold after the first push."""
     for row in range(1, len(course.time)):
         if course.time[row] <= start:
             continue

@@ -31,7 +31,7 @@ SIDE = re.compile(r"(^|_)(left|right|l|r)(?=_|$)")
 
 
 def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
-    """The diagnosis in a line of trials.csv; empty where older results have none.
+    """Return the diagnosis in a line of trials.csv; empty where older results have none.
 
     Raises ValueError for a number that is none, and for a cause without its time or size.
     """
@@ -73,7 +73,7 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
 
 
 def cause(d: Diagnosis, steps: int) -> str:
-    """The cause of a loss in a few words, without numbers and sides, to count by."""
+    """Return the cause of a loss in a few words, without numbers and sides, to count by."""
     if d.loss in ("diverged", "error", "down"):
         return LOSSES[d.loss]
     first = "no motor of the legs at its limit"
@@ -97,14 +97,14 @@ def cause(d: Diagnosis, steps: int) -> str:
 
 
 def _fell_before(d: Diagnosis) -> bool:
-    """Whether the capture point had left the support for good when the QP first failed: no torques
-    then bring it back, and a foot that tilts or lifts leaves the QP without the forces that it
-    needs. The failure is a consequence of the fall, not its cause."""
+    """Return whether the capture point had left the support for good when the QP first failed: no
+    torques then bring it back, and a foot that tilts or lifts leaves the QP without the forces that
+    it needs. The failure is a consequence of the fall, not its cause."""
     return d.failures_from is not None and (d.capture_left or float("inf")) <= d.failures_from
 
 
 def losses(lost: Iterable[tuple[Diagnosis, int]]) -> list[Loss]:
-    """The causes of lost trials (diagnosis, steps), the most frequent one first."""
+    """Return the causes of lost trials (diagnosis, steps), the most frequent one first."""
     counts = Counter(cause(d, steps) for d, steps in lost if d.loss is not None)
     return [{"cause": name, "trials": count} for name, count in counts.most_common()]
 
@@ -126,5 +126,5 @@ def push_text(push: Push | Kick) -> str:
 
 
 def towards(direction: float) -> str:
-    """The name of the nearest of eight directions [deg]."""
+    """Return the name of the nearest of eight directions [deg]."""
     return DIRECTIONS[round(direction / 45.0) % len(DIRECTIONS)]

@@ -123,10 +123,10 @@ def benchmark(
 
 
 def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
-    """The reference, all other packaged controllers that can rest, and the robot's policies.
+    """Return the reference, the other packaged controllers that stand still, and the policies.
 
-    Controllers that walk, and policies on them, are left out: where nothing is commanded they are
-    `feedback-step`.
+    Controllers that walk, and policies on them, are left out: without commands they are equivalent
+    to `feedback-step`.
     """
     elsewhere = {REFERENCE, *RESTLESS, *walking_controllers()}
     others = (name for name in packaged("controllers") if name not in elsewhere)
@@ -135,14 +135,14 @@ def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
 
 
 def packaged_policies(robot: str) -> list[str]:
-    """The packaged policies that were trained on the robot of this name."""
+    """Return the packaged policies that were trained on the robot of this name."""
     folder = packaged_folder("policies")
     states = {name: read_json(folder / name / "state.json") for name in packaged("policies")}
     return [name for name, state in states.items() if state["robot"] == robot]
 
 
 def walks(policy: str) -> bool:
-    """Whether this packaged policy moves the steps of a walk."""
+    """Return whether this packaged policy moves the steps of a walk."""
     config = read_yaml(packaged_folder("policies") / policy / "config.yaml")
     return bool(config.get("action") == "walk")
 

@@ -35,9 +35,9 @@ class Settings:
     """Everything that determines a result, except the machine."""
 
     format: int  #: of the folder
-    suite_name: str  #: as the user wrote it
+    suite_name: str  #: as typed by the user
     suite: dict[str, Any]  #: its fields
-    robot: str  #: name or path, as the user wrote it
+    robot: str  #: name or path, as typed by the user
     robot_fingerprint: str  #: of what was loaded
     seed: int = field(metadata={"min": 0})  #: of the trials
     limits: LimitTable | None  #: what pushes are measured by; None: the ankle limit
@@ -97,12 +97,12 @@ class ResultFolder:
         self.finished[controller, number] = outcome
 
     def close(self) -> None:
-        """Stop; what is finished stays."""
+        """Close the folder; finished trials stay."""
         self._log.close()
         self._lock.release()
 
     def finish(self, rows: Sequence[Mapping[str, object]], summary: Summary) -> None:
-        """Write the trials and, last, the summary."""
+        """Write the trials, then the summary."""
         write_atomic(self.path / TRIALS, csv_text(rows, COLUMNS))
         write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
         self.close()
@@ -153,7 +153,7 @@ def _check_same(path: Path, known: Mapping[str, object]) -> Settings:
 
 
 def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:
-    """Outcomes by controller and number, and how many lines could not be read."""
+    """Return outcomes by controller and number, and how many lines could not be read."""
     path = folder / LOG
     entries, damaged = read_log(path)
     finished: dict[Key, Outcome] = {}
@@ -167,7 +167,8 @@ def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:
 
 
 def read_settings(folder: Path) -> Settings:
-    """The settings of a result; raises ConfigError where there are none, or of another format."""
+    """Return the settings of a result; raise ConfigError where there are none, or of another
+    format."""
     path = folder / SETTINGS
     data = read_yaml(path)
     check_format(data.get("format"), path)
@@ -178,7 +179,7 @@ def read_settings(folder: Path) -> Settings:
 
 
 def _difference(name: str, old: object, new: object) -> str:
-    """The difference in words."""
+    """Return the difference in words."""
     if isinstance(old, dict) and isinstance(new, dict):
         keys = [k for k in {**old, **new} if old.get(k) != new.get(k)]
         what = ", ".join(f"{k} {old.get(k)}, not {new.get(k)}" for k in keys)

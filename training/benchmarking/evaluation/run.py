@@ -318,8 +318,8 @@ def _check_engine(engine: Physics, robot: Robot, plan: Plan) -> None:
 
 
 def _warm_up(agents: Iterable[Agent]) -> None:
-    """Compile what is not yet compiled, once, before many processes would do it each."""
+    """Compile all kernels once, instead of in every process."""
     for agent in agents:
-        with contextlib.suppress(Exception):  # a controller from outside: its trials say what
+        with contextlib.suppress(Exception):  # an external controller: its trials record the error
             observation, _ = agent.env.reset(seed=0, options={"push": []})
             agent.env.step(agent.act(observation))

@@ -66,7 +66,7 @@ def ranked(entries: Mapping[str, Entry]) -> list[str]:
 def places(
     entries: Mapping[str, Entry], measure: tuple[str, str] | None = None
 ) -> dict[str, int | None]:
-    """The rank of each controller; those whose results print alike share one.
+    """Return the rank of each controller; those whose results print alike share one.
 
     None for those with an external force at a soft root, or without a value of the `measure`: a key
     and its print format, by default that of `ranked`.
@@ -84,7 +84,7 @@ def assisted(entry: Entry) -> bool:
 
 
 def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
-    """The key that controllers are ranked by, and the form in which it is printed."""
+    """Return the key that controllers are ranked by, and the form in which it is printed."""
     for key, form in (("j50_mean", ".1f"), ("fraction50", ".2f")):
         if all(key in entry for entry in entries.values()):
             return key, form
@@ -92,7 +92,7 @@ def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
 
 
 def walked(entries: Mapping[str, Entry]) -> bool:
-    """Whether all are judged by falls, see `Entry.criterion`."""
+    """Return whether all are judged by falls, see `Entry.criterion`."""
     return all(entry.get("criterion") == CRITERION for entry in entries.values())
 
 
@@ -227,5 +227,5 @@ def _pairs(summary: Summary, width: int) -> Table:
 
 
 def _room(names: Iterable[str], most: int) -> int:
-    """Width of a column of names that are not to be cut, but for those longer than `most`."""
+    """Return the width of a column of names, at most `most`."""
     return min(max(len(name) for name in names), most)

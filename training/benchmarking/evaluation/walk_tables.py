@@ -103,7 +103,7 @@ def scenario_names(summary: Summary) -> list[str]:
 
 
 def scenario_cell(found: ScenarioFigures | None) -> str:
-    """The share of a scenario's trials without a fall."""
+    """Return the share of a scenario's trials without a fall."""
     return NONE if found is None else STOOD.text(found)
 
 

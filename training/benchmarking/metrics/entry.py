@@ -1,4 +1,4 @@
-"""A controller's entry of summary.json is computed here."""
+"""Compute a controller's entry of summary.json."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -199,7 +199,7 @@ def _levels(evaluated: Evaluated, suite: Suite) -> list[RealismLevel]:
 
 
 def robot_figures(limits: PushLimits) -> RobotFigures:
-    """The robot's figures that a report needs."""
+    """Return the robot's figures that a report needs."""
     robot = limits.robot
     return {
         "name": robot.name,

@@ -26,7 +26,7 @@ SECTOR = 45.0  # [deg] in which random directions are counted together
 
 
 def part(evaluated: Evaluated, *names: str) -> Evaluated:
-    """The trials of some parts."""
+    """Return the trials of some parts."""
     return [(trial, outcome) for trial, outcome in evaluated if trial.part in names]
 
 
@@ -44,7 +44,8 @@ def rated(evaluated: Evaluated) -> Evaluated:
 
 
 def met_by_all(evaluated: Evaluated) -> Evaluated:
-    """The trials without the second stage of pushed walks, whose pushes a controller chose."""
+    """Return the trials without the second stage of pushed walks, whose pushes a controller
+    chose."""
     return [(trial, outcome) for trial, outcome in evaluated
             if trial.part != WALK_PUSH or trial.stage == 1]  # fmt: skip
 
@@ -72,7 +73,7 @@ def pushes(evaluated: Evaluated) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def won(evaluated: Evaluated) -> np.ndarray:
-    """An array (n,), true where a trial was won: recovered, or of a walk not fallen."""
+    """Return an array (n,), true where a trial was won: recovered, or of a walk not fallen."""
     return np.array([is_won(trial, outcome) for trial, outcome in evaluated], dtype=bool)
 
 
@@ -82,7 +83,7 @@ def fractions(evaluated: Evaluated) -> np.ndarray:
 
 
 def sectors(evaluated: Evaluated) -> EnvelopeFit:
-    """Fits of the fraction of the limit in sectors of 45°, named by their middle."""
+    """Return fits of the fraction of the limit in sectors of 45°, named by their middle."""
     direction, _, _ = pushes(evaluated)
     middle = SECTOR * (np.rint(direction / SECTOR) % (360.0 / SECTOR))
     return mean_over_directions(middle, fractions(evaluated), won(evaluated))
@@ -101,7 +102,7 @@ def fitted(one: DirectionFit, name: str) -> dict[str, Any]:
 
 
 def rate(evaluated: Evaluated) -> Rate:
-    """The counts of recovered and of fallen trials, and their rates, with intervals."""
+    """Return the counts of recovered and of fallen trials, and their rates, with intervals."""
     trials = len(evaluated)
     recovered = sum(outcome.recovered for _, outcome in evaluated)
     upright = sum(outcome.upright for _, outcome in evaluated)
@@ -117,7 +118,7 @@ def rate(evaluated: Evaluated) -> Rate:
 
 
 def counts(evaluated: Evaluated) -> Counts:
-    """Counts of how trials ended, and medians of what was recorded, some of those that were won."""
+    """Return counts of outcomes, and medians of figures, some of them of won trials only."""
     outcomes = [outcome for _, outcome in evaluated]
     standing = [outcome for trial, outcome in evaluated if is_won(trial, outcome)]
     unpushed = [outcome for outcome in outcomes if outcome.com_drift is not None]
@@ -171,12 +172,11 @@ def rising(outcomes: Sequence[Outcome]) -> Rising:
 
 
 def ankle_limits(evaluated: Evaluated, limits: PushLimits) -> np.ndarray:
-    """The ankle limit [N·s] for the push of every trial."""
+    """Return the ankle limit [N·s] for the push of every trial."""
     direction, _, duration = pushes(evaluated)
     return np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])
 
 
 def lost(evaluated: Evaluated) -> list[int]:
-    """The numbers of the trials of the suite's own level that were not won, rising: those whose
-    causes are counted."""
+    """Return the sorted numbers of the trials at the suite's own level that were lost."""
     return [trial.number for trial, outcome in once(evaluated) if not is_won(trial, outcome)]

@@ -20,7 +20,8 @@ NAMED = ("body", "realism")  # factors whose levels are names, not numbers
 
 
 def factor_figures(evaluated: Evaluated, standard: Mapping[str, str]) -> list[Factor]:
-    """Recovered rate of every level, and what it lost and won against the standard case."""
+    """Return the recovered rate of every level, and what it lost and won against the standard
+    case."""
     found_cells = cells(evaluated, lambda trial: (str(trial.factor), str(trial.level)))
     base = found_cells.pop((STANDARD, STANDARD), [])
     found: dict[str, list[Level]] = {}
@@ -49,7 +50,7 @@ def _level(level: str, evaluated: Evaluated, base: Evaluated) -> Level:
 
 
 def eurobench_figures(evaluated: Evaluated, limits: PushLimits) -> Eurobench:
-    """Sway and recovery time over recovered standard pushes; stability margins."""
+    """Return the sway and recovery time over recovered standard pushes; stability margins."""
     plain = [outcome for _, outcome in part(evaluated, "envelope") if outcome.recovered]
     return {
         "body_sway_mean": mean_or_none([outcome.sway for outcome in plain]),
@@ -61,7 +62,8 @@ def eurobench_figures(evaluated: Evaluated, limits: PushLimits) -> Eurobench:
 
 
 def _margins(evaluated: Evaluated, limits: PushLimits) -> list[MarginFigures]:
-    """Stability margin per direction: force [N], energy [J], and both on a human's scale."""
+    """Return the stability margin per direction: force [N], energy [J], and both on a human's
+    scale."""
     if not evaluated:
         return []
     direction, impulse, duration = pushes(evaluated)

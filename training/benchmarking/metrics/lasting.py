@@ -14,7 +14,7 @@ RESAMPLES = 2000
 
 
 def held(outcome: Outcome) -> bool:
-    """Whether the robot did not fall."""
+    """Return whether the robot did not fall."""
     return not outcome.fallen and outcome.error is None
 
 
@@ -47,7 +47,8 @@ def sustained_figures(evaluated: Evaluated, mass: float) -> list[SustainedFigure
 
 
 def survived(trial: Trial, outcome: Outcome) -> int:
-    """The number of pushes after which the robot still stood: until the next one, or the end."""
+    """Return the number of pushes after which the robot still stood: until the next one, or the
+    end."""
     if held(outcome):
         return len(trial.pushes)
     if outcome.fall_time is None:  # the controller raised
@@ -57,7 +58,7 @@ def survived(trial: Trial, outcome: Outcome) -> int:
 
 
 def gust_figures(evaluated: Evaluated) -> GustFigures:
-    """The counts, and the mean number of pushes survived with its bootstrap interval."""
+    """Return the counts, and the mean number of pushes survived with its bootstrap interval."""
     numbers = np.array([survived(trial, outcome) for trial, outcome in evaluated], dtype=float)
     rng = np.random.default_rng(0)
     drawn = rng.choice(numbers, (RESAMPLES, len(numbers))).mean(axis=1)

@@ -29,7 +29,7 @@ MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level ha
 
 
 def suite_repertoire(suite: Suite, robot: Robot, folder: Path, overwrite: bool) -> Repertoire:
-    """The motions of a suite, empty where it has none; raises as `load_repertoire`."""
+    """Return the motions of a suite, empty where it has none; raise as `load_repertoire`."""
     if suite.motions is None:
         return Repertoire({}, {}, {})
     return load_repertoire(suite.motions.names, suite.motions.labels, robot, folder, overwrite)
@@ -108,7 +108,7 @@ def in_motion(evaluated: Evaluated) -> list[InMotion]:
 
 
 def _standing(evaluated: Evaluated, moving: Evaluated) -> EnvelopeFit | None:
-    """The fit of the pushes that it stood for; None where there are none."""
+    """Return the fit of the pushes while standing; None without any."""
     stood = part(evaluated, STANDING)
     if not stood:
         return None
@@ -119,7 +119,7 @@ def _standing(evaluated: Evaluated, moving: Evaluated) -> EnvelopeFit | None:
 
 
 def _row(name: str | None, figures: dict[str, Any], standing: EnvelopeFit | None) -> InMotion:
-    """The figures of a motion, and its share over that of standing, if there is one."""
+    """Return the figures of a motion, and its share over that of standing, if there is one."""
     over, ends = None, None
     if standing is not None:
         here = figures["share50"], figures["share50_ci95"]

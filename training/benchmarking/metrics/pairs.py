@@ -34,7 +34,7 @@ def pair_figures(
 
 
 def alike(a: Evaluated, b: Evaluated) -> list[tuple[Trial, Outcome, Outcome]]:
-    """The trials that both met, alike in all: second stages share numbers, but not pushes."""
+    """Return the trials common to both: second stages share numbers, but not pushes."""
     others = {trial.number: (trial, outcome) for trial, outcome in b}
     return [
         (trial, outcome, others[trial.number][1])
@@ -44,12 +44,12 @@ def alike(a: Evaluated, b: Evaluated) -> list[tuple[Trial, Outcome, Outcome]]:
 
 
 def paired(met: list[tuple[Trial, Outcome, Outcome]]) -> Paired | None:
-    """Counts of the trials that both met; None without any."""
+    """Return counts of the common trials; None without any."""
     return counted((is_won(trial, one), is_won(trial, two)) for trial, one, two in met)
 
 
 def counted(won_by: Iterable[tuple[bool, bool]]) -> Paired | None:
-    """Counts of trials by who won them, a or b, with McNemar's test of them."""
+    """Return counts of trials won by a, b, both or neither, with McNemar's test."""
     found = Counter(won_by)
     if not found:
         return None

@@ -19,7 +19,8 @@ MEANS = tuple(WalkMeans.__annotations__)
 
 
 def walk_levels(evaluated: Evaluated, duration: float) -> list[WalkLevel]:
-    """The levels of the parts that walk, in the order of the suite; trials last `duration` [s].
+    """Return the levels of the parts that walk, in the order of the suite; trials last `duration`
+    [s].
 
     Of pushes whose J50 is measured, those that all controllers meet.
     """

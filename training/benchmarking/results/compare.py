@@ -1,4 +1,4 @@
-"""Two results are compared here, with intervals."""
+"""Compare two results, with intervals."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -121,7 +121,7 @@ def print_comparison(found: Comparison, a: str | Path, b: str | Path, console: C
 
 
 def _outcomes(results: Results, name: str) -> dict[tuple[str, ...], tuple[bool, bool]]:
-    """A mapping from what a trial must share to be a pair, to how it ended."""
+    """Return key of a paired trial → its outcome."""
     return {record.met: (record.recovered, record.upright) for record in results.of(name)}
 
 
@@ -153,7 +153,7 @@ Estimate = tuple[float, Interval]
 
 
 def _by_intervals(name: str, title: str, before: Estimate, after: Estimate) -> Iterator[Change]:
-    """A figure with an interval of its own in both; none where an interval is open."""
+    """Yield a figure with an interval of its own in both; none where an interval is open."""
     around = both_ends(before[1]), both_ends(after[1])
     if around[0] is not None and around[1] is not None:
         change, (low, high) = difference(before[0], around[0], after[0], around[1])

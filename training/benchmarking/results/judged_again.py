@@ -26,7 +26,7 @@ KEPT = ("tick_us", "fingerprint", "timesteps")
 def judged_again(
     folder: Path, settings: Settings, summary: Summary, lines: Sequence[Mapping[str, str]]
 ) -> Summary:
-    """The summary, in which the walks of an older result are judged by falls.
+    """Return the summary, in which the walks of an older result are judged by falls.
 
     Such a result counted walks as lost that stayed upright, but differed from their command by more
     than 0.05 m/s or 5°. Its columns say who fell: J50, the ranking and pairs are computed again

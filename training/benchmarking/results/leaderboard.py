@@ -83,7 +83,7 @@ def _summary(path: Path) -> Summary:
 
 
 def leaderboard(summaries: Mapping[str, Summary]) -> str:
-    """The page as Markdown; `summaries` by where they come from."""
+    """Return the page as Markdown; `summaries` by where they come from."""
     summary, origin = merged(summaries)
     (_, first), *later = summaries.items()
     limit = dict(summary["robot"]["ankle_limit"])
@@ -106,7 +106,7 @@ def leaderboard(summaries: Mapping[str, Summary]) -> str:
 
 
 def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
-    """The first result with the rows of later ones; and whose result each row is.
+    """Return the first result with the rows of later ones, and the source of each row.
 
     A controller of a later result takes the place of an earlier one of its name; the reference
     stays that of the first.
@@ -149,7 +149,7 @@ def _shared(angles: set[float], summary: Summary) -> dict[str, object]:
 
 
 def _shape(entry: Entry) -> tuple[list[float], list[int]]:
-    """A controller's directions, and the number of levels of each factor."""
+    """Return a controller's directions, and the number of levels of each factor."""
     angles = [direction["direction"] for direction in entry["directions"]]
     return angles, [len(factor["levels"]) for factor in entry.get("factors", ())]
 

@@ -35,7 +35,7 @@ def check_alike(
 
 
 def direction_table(entries: Mapping[str, Entry], names: Iterable[str], figure: Figure) -> Table:
-    """A figure in every direction, of the controllers that were pushed."""
+    """Return a figure in every direction, of the controllers that were pushed."""
     found = {name: {d["direction"]: d for d in entries[name].get("directions", ())}
              for name in names}  # fmt: skip
     angles = sorted({angle for each in found.values() for angle in each})

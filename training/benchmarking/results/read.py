@@ -109,7 +109,7 @@ class Results:
         return [record for record in self.records if record.controller == controller]
 
     def record(self, controller: str, trial: int) -> Record:
-        """The line of a controller in a trial; raises ConfigError where there is none."""
+        """Return the line of a controller in a trial; raise ConfigError where there is none."""
         if controller not in self.controllers:
             raise ConfigError(f"{shown(controller)} took no part", source=self.folder,
                               field="controller", choices=self.controllers)  # fmt: skip
@@ -120,7 +120,8 @@ class Results:
         return numbers[trial]
 
     def trial(self, record: Record) -> Trial:
-        """The trial of a record, exactly; raises ConfigError where its line does not parse."""
+        """Return the trial of a record, exactly; raise ConfigError where its line does not
+        parse."""
         return read_trial(record.line, self.folder / TRIALS)
 
 

@@ -151,7 +151,7 @@ def _episode(results: Results, name: str, trial: Trial, size: tuple[int, int]) -
 
 
 def player(results: Results, name: str, trial: Trial) -> Agent:
-    """The controller as it took part, in the conditions of `trial`.
+    """Return the controller as it took part, in the conditions of `trial`.
 
     Raises ConfigError if it or the robot has changed since.
     """

@@ -24,7 +24,7 @@ def is_of_scenarios(summary: Summary) -> bool:
 
 
 def scenario_page(summaries: Mapping[str, Summary], page: str) -> str:
-    """The page as Markdown; `summaries` by where they come from, `page` where it is written.
+    """Return the page as Markdown; `summaries` by where they come from, `page` where it is written.
 
     A controller of a later result of a robot and a level takes the place of an earlier one of its
     name. Raises ConfigError for results of another suite or seed, and for controllers of other

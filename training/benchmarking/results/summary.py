@@ -23,7 +23,8 @@ PAIR = (("both", "only_a", "only_b", "neither", "p_mcnemar"),)  # the same, of a
 
 
 def read_summary(path: str | Path) -> Summary:
-    """A summary.json; raises ConfigError, naming the file and the field, where it is not one."""
+    """Return a summary.json; raise ConfigError, naming the file and the field, where it is not
+    one."""
     path = Path(path)
     if not is_file(path):
         raise ConfigError("cannot be read (no such file): not a finished result", source=path)
@@ -66,7 +67,8 @@ def read_summary(path: str | Path) -> Summary:
 
 
 def _values(data: Any, field: str = "") -> Iterator[tuple[str, object]]:
-    """The texts and whole numbers in plain data, keys among them, each with its dotted field."""
+    """Yield the texts and whole numbers in plain data, keys among them, each with its dotted
+    field."""
     if isinstance(data, dict):
         for key, value in data.items():
             yield field, key

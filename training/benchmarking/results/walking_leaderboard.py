@@ -32,7 +32,8 @@ def is_of_walks(summary: Summary) -> bool:
 
 
 def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
-    """The page as Markdown; `summaries` by where they come from, of one suite, seed and robot.
+    """Return the page as Markdown; `summaries` by where they come from, of one suite, seed and
+    robot.
 
     A controller of a later result takes the place of an earlier one of its name. The order is that
     of the mean J50 [N·s], those without one last. Raises ConfigError for results of another suite,
@@ -99,8 +100,8 @@ def _order(entry: Entry) -> tuple[bool, bool, float]:
 
 
 def _by_one_verdict(entries: Mapping[str, Entry]) -> dict[str, Entry]:
-    """The entries without the J50 of older results that count walks off their command as lost,
-    where others count falls: the two do not compare."""
+    """Return the entries without the J50 of older results that count walks off their command as
+    lost, where others count falls: the two do not compare."""
     older = {name for name, entry in entries.items() if entry.get("criterion") != NOT_FALLEN}
     if len(older) == len(entries):
         return dict(entries)

@@ -76,7 +76,7 @@ class Envelope(Part):
         return [360.0 * k / self.directions for k in range(self.directions)]
 
     def _range(self, draw: Draw, angle: float) -> Range:
-        """Impulses of the first stage [N·s]."""
+        """Return the impulses of the first stage [N·s]."""
         if self.impulses is not None:
             low, high = (draw.robot.mass * j for j in self.impulses)
         else:
@@ -97,7 +97,7 @@ class Envelope(Part):
         yield angle, high, high, 1
 
     def rough(self, first: Sequence[Trial], won: Sequence[bool], angle: float) -> LogisticFit:
-        """The fit of J50 [N·s] to the first stage."""
+        """Return the fit of J50 [N·s] to the first stage."""
         here = [(trial.pushes[0].impulse, each) for trial, each in zip(first, won, strict=True)
                 if trial.pushes[0].direction == angle]  # fmt: skip
         return fit_logistic(*zip(*here, strict=True))

@@ -43,7 +43,7 @@ class Cell:
     count: int = 1
 
     def push(self, draw: Draw, angle: float, fraction: float) -> Push:
-        """A push of a fraction of the ankle limit for its duration."""
+        """Return a push of a fraction of the ankle limit for its duration."""
         duration = draw.standard.push_duration if self.duration is None else self.duration
         push = draw.push(angle, fraction * draw.limits.ankle(angle, duration))
         body = self.body or push.body
@@ -113,7 +113,7 @@ class Mix(Part):
         return [self._trial(draw, number + k, *where) for k, where in enumerate(drawn)]
 
     def _trial(self, draw: Draw, number: int, angle: float, fraction: float) -> Trial:
-        """The order of the draws is part of the suite."""
+        """Return a random trial; the order of the draws is part of the suite."""
         rng = generator(draw.seed, number)
         duration = float(np.exp(rng.uniform(*np.log(self.duration))))
         body = draw.bodies[int(rng.integers(len(draw.bodies)))]
@@ -133,7 +133,7 @@ class Mix(Part):
 
 
 def repeats_of(push: Push, count: int, draw: Draw) -> list[Push]:
-    """The same push `count` times, the suite's interval from start to start."""
+    """Return the same push `count` times, the suite's interval from start to start."""
     interval = draw.standard.interval
     return [replace(push, start=push.start + k * interval) for k in range(count)]
 

@@ -51,7 +51,7 @@ class Sustained(Part):
         return trials
 
     def bodies(self, draw: Draw) -> tuple[str, ...]:
-        """The bodies of which each push draws one."""
+        """Return the bodies from which each push samples one."""
         arms = find_arms(draw.robot) if self.hands else ()
         return (*draw.bodies[:2], *(draw.robot.model.body(arm.hand).name for arm in arms))
 

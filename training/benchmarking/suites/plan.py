@@ -82,9 +82,9 @@ class Plan:
         return name not in self._standing or not trial.commands
 
     def _at(self, name: str, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
-        """The trials of a part at a level; None: the suite's, where they have none of their own.
+        """Return the trials of a part at a level; None: their own level, else the suite's.
 
-        A scenario's own level has the last word in the suite's.
+        A scenario's own level overrides the suite's.
         """
         real = self.suite.realism if level is None else level
         wait, found = self.suite.get_up_time, []

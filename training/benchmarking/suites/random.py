@@ -89,7 +89,7 @@ class Quiet(Part):
 def sampled(
     sampler: PushSampler, bodies: tuple[str, ...], draw: Draw, rng: np.random.Generator
 ) -> list[Push]:
-    """The pushes of a trial, of `bodies` where the sampler names none.
+    """Return the pushes of a trial, of `bodies` where the sampler names none.
 
     What is a fraction of J50 is one of the ankle limit where no J50 of the robot was measured.
     """
@@ -104,8 +104,8 @@ def sampled(
 def one_after_the_other(
     sampler: PushSampler, later: Range, until: float, draw: Draw, number: int
 ) -> tuple[Push, ...]:
-    """The pushes of a trial that begin before `until` [s]; all but the first times a number from
-    `later`. Without `bodies` the robot's first push body is pushed."""
+    """Return the pushes of a trial that begin before `until` [s]; all but the first times a number
+    from `later`. Without `bodies` the robot's first push body is pushed."""
     rng = generator(draw.seed, number)
     first, *rest = sampled(sampler, draw.bodies[:1], draw, rng)
     scaled = [replace(p, impulse=p.impulse * rng.uniform(*later)) for p in rest]

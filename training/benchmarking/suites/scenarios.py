@@ -36,7 +36,7 @@ class Scenario:
         check_rising(self.later, "later")
 
     def drawn(self, draw: Draw, number: int) -> tuple[Push, ...]:
-        """The pushes of a trial, by a number that all scenarios share."""
+        """Return the pushes of a trial, by a number that all scenarios share."""
         if self.pushes is None:
             return ()
         return one_after_the_other(self.pushes, self.later, self.duration - CALM, draw, number)

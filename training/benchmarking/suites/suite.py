@@ -86,7 +86,7 @@ class Suite(Standard):
         return any(name in WALKING for name in self.parts) or any(commanded)
 
     def performing(self, names: Many[str]) -> Suite:
-        """The suite with other motions; raises ConfigError where none is performed."""
+        """Return the suite with other motions; raise ConfigError where none is performed."""
         if self.motions is None:
             raise ConfigError("this suite performs no motions", field="motions")
         return replace(self, motions=replace(self.motions, names=tuple(names)))
@@ -109,7 +109,7 @@ PARTS = tuple(f.name for f in fields(Suite)
 
 
 def load_suite(name: str | Path) -> Suite:
-    """A packaged suite (`configs/suites`) or a path to one.
+    """Return a packaged suite (`configs/suites`) or a path to one.
 
     Raises ConfigError naming the file, the field and the choices.
     """

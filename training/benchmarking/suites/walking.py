@@ -27,12 +27,12 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 def from_start(command: GaitCommand) -> TimedCommand:
-    """The command from the reset on."""
+    """Return the command from the reset on."""
     return TimedCommand(**{**asdict(command), "start": 0.0})
 
 
 def command_text(command: GaitCommand) -> str:
-    """The command in words, such as `ahead 0.5, turn 0.25`."""
+    """Return the command in words, such as `ahead 0.5, turn 0.25`."""
     names = [each.name for each in fields(GaitCommand)]
     said = [f"{name} {getattr(command, name):g}" for name in names if getattr(command, name)]
     return ", ".join(said) or "stand"
@@ -98,12 +98,12 @@ class Walking:
     window: float = field(default=12.0, metadata={"min": 0.0})  # some strides
 
     def begins(self, draw: Draw, number: int) -> float:
-        """The start of the push of a trial [s]."""
+        """Return the start of the push of a trial [s]."""
         shift = np.random.default_rng(np.random.SeedSequence([draw.seed, 3])).uniform()
         return float(self.start + (shift + GOLDEN * number) % 1.0 * self.window / draw.robot.omega)
 
     def walking(self, draw: Draw, trials: Iterable[Trial]) -> list[Trial]:
-        """The trials with this command, their only push at its time."""
+        """Return the trials with this command, their only push at its time."""
         return [
             replace(
                 trial, **commanded(self.command),

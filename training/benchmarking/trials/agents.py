@@ -51,7 +51,7 @@ from .names import NO_CONTROL, check_name
 class Agent:
     """A name, an environment, and the actions in it."""
 
-    name: str  #: as the user wrote it
+    name: str  #: as typed by the user
     env: BalanceEnv  #: the environment it acts in
     act: Callable[[np.ndarray], np.ndarray]  #: deterministic action (na,) for an observation (no,)
     fingerprint: str  #: hash of the controller's configuration and the policy's weights
@@ -117,12 +117,13 @@ def check_walks(name: str, agent: Agent, source: str) -> None:
 
 
 def can_walk(agent: Agent) -> bool:
-    """Whether the controller of an agent takes commands of a walk."""
+    """Return whether the controller of an agent takes commands of a walk."""
     return isinstance(agent.env, CommandedEnv) and agent.env.command is not None
 
 
 def check_may_walk(name: str, source: str) -> ControllerConfig | None:
-    """The configuration of a controller that is described by a packaged name or a file, or None.
+    """Return the configuration of a controller that is described by a packaged name or a file, or
+    None.
 
     Raises ConfigError as `check_walks` where that tells that it does not walk: nothing is compiled
     for it.
@@ -138,26 +139,27 @@ def check_may_walk(name: str, source: str) -> ControllerConfig | None:
 
 
 def does_not_walk(name: str, source: str) -> ConfigError:
-    """The error of a controller that does not walk where `source` asks for one that does."""
+    """Return the error of a controller that does not walk where `source` asks for one that does."""
     return ConfigError(f"the controller {shown(name)} does not walk", source=source,
                        field="controller", choices=walking_controllers())  # fmt: skip
 
 
 def follows_no_motion(name: str, source: str | None = None) -> ConfigError:
-    """The error of a controller that tracks no reference where `source` has a motion performed."""
+    """Return the error of a controller that tracks no reference where `source` has a motion
+    performed."""
     return ConfigError(f"{shown(name)} follows no motion: name a controller that tracks a "
                        "reference, or a policy on one", source=source,
                        field="controller")  # fmt: skip
 
 
 def _stand_in(config: ControllerConfig) -> str:
-    """What takes the place of a controller where state and robot are uncertain, if anything."""
+    """Return the controller that replaces this one at realism levels, or an empty text."""
     other = where_uncertain(config)
     return "" if other is None else to_yaml(other)
 
 
 def _wherever(config: ControllerConfig) -> ControllerConfig:
-    """The same for a policy's files in any folder: their digest tells them apart."""
+    """Return the configuration without the folder of a policy's files, which have a digest."""
     if isinstance(config, PolicyFileConfig):
         return replace(
             config, policy=Path(config.policy).name, described_in="", said=(), origin=None
@@ -166,7 +168,7 @@ def _wherever(config: ControllerConfig) -> ControllerConfig:
 
 
 def _idle(name: str, env: BalanceEnv, content: str) -> Agent:
-    """An agent whose action is always zero."""
+    """Return an agent whose action is always zero."""
     action = np.zeros(len(env.action_names))
     return Agent(name, env, lambda observation: action, _hash(content.encode()))
 
@@ -196,7 +198,7 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
 
 
 def _guarded(name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, object]) -> Agent:
-    """A walker and the recovery policy that takes over from it."""
+    """Return a walker and the recovery policy that takes over from it."""
     from poise.training.learning.policy import load_policy
 
     walker = walker_config(guard, name)
@@ -235,13 +237,13 @@ ENVIRONMENTS = {
 
 
 def _is_controller(name: str, robot: Robot) -> bool:
-    """True if a class, or what a function makes, gives torques."""
+    """Return whether a class, or the object made by a function, is a controller (has `torques`)."""
     found = find_plugin(name)
     return hasattr(found if isinstance(found, type) else make_plugin(name, robot), "torques")
 
 
 def _outside_policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
-    """A policy from outside: `act(observation)` in the environment that it names, or makes."""
+    """Return the agent of an external policy, in the environment that it names or makes."""
     policy = make_plugin(name, robot)
     if not hasattr(policy, "act"):
         raise ConfigError("has neither torques (a controller) nor act (a policy)", source=name)

@@ -97,21 +97,21 @@ class Walk:
         ])  # fmt: skip
 
     def mean_yaw(self, first: int, last: int) -> float:
-        """Mean heading from row to row [rad]."""
+        """Return the mean heading from row to row [rad]."""
         return float(np.mean(self.record.yaw[first:last]))
 
     def command_at(self, time: float) -> GaitCommand:
-        """The command that holds at a time [s]."""
+        """Return the command that holds at a time [s]."""
         past = [each for each in self.commands if each.start <= time + 1e-9]
         return past[-1] if past else GaitCommand()
 
     def _changed(self, time: float) -> float:
-        """The start of the command that holds at a time [s]."""
+        """Return the start of the command that holds at a time [s]."""
         return max((each.start for each in self.commands if each.start <= time + 1e-9), default=0.0)
 
     def own_error(self, until: float | None = None) -> TrackingError | None:
-        """The tracking error of the walk itself: the largest over its settled strides i that end
-        before `until` [s] and follow the last command,
+        """Return the tracking error of the walk itself: the largest over its settled strides i that
+        end before `until` [s] and follow the last command,
 
             e_v = max_i |v_i − v*|,   e_ω = max_i |ω_i − ω*|
 
@@ -129,8 +129,8 @@ class Walk:
         return TrackingError(speed, float(np.abs(errors[:, 2]).max()))
 
     def last_error(self) -> TrackingError | None:
-        """The distance of the mean velocity over the last two strides from the command, along their
-        mean heading.
+        """Return the distance of the mean velocity over the last two strides from the command,
+        along their mean heading.
 
         None where there are no four steps between touchdowns, the last one in the last second: it
         does not walk any more.
@@ -143,7 +143,8 @@ class Walk:
         return TrackingError(float(np.hypot(*off[:2])), abs(float(off[2])))
 
     def as_commanded(self, own: TrackingError = NO_ERROR) -> bool:
-        """Whether the last two strides are as near to the command as the controller's own strides:
+        """Return whether the last two strides are as near to the command as the controller's own
+        strides:
 
             |v − v*| ≤ e_v + 0.05 m/s,   |ω − ω*| ≤ e_ω + 5 °/s
 
@@ -156,7 +157,7 @@ class Walk:
         return last is not None and near(last, own)
 
     def figures(self) -> dict[str, float | None]:
-        """The figures of an `Outcome`, of the strides and steps that are settled."""
+        """Return the figures of an `Outcome`, of the strides and steps that are settled."""
         velocity, error = self.velocity[self.settled], (self.velocity - self.wanted)[self.settled]
         off, turn = np.linalg.norm(error[:, :2], axis=1), error[:, 2]
         return {
@@ -175,7 +176,7 @@ class Walk:
         }
 
     def _steps(self) -> dict[str, float | None]:
-        """Means of the steps that end settled strides, and their error."""
+        """Return means of the steps that end settled strides, and their error."""
         rows, times = self.landed.row, self.record.time
         ends = np.flatnonzero(self.settled) + 2
         yaws = [self.mean_yaw(rows[k - 2], rows[k]) for k in ends]
@@ -210,7 +211,7 @@ class Walk:
         return {name: float(each) / way for name, each in zip(names, spent, strict=True)}
 
     def _knees(self) -> dict[str, float | None]:
-        """Mean and largest |τ|/m [N·m/kg] of the stance leg's knee on one foot."""
+        """Return the mean and largest |τ|/m [N·m/kg] of the stance leg's knee on one foot."""
         r = self.record
         single = self._known & (r.down.sum(axis=1) == 1)
         load = r.knees[single, np.argmax(r.down[single], axis=1)]
@@ -231,8 +232,9 @@ class Walk:
         return worst if self._known.any() else None
 
     def _circle_error(self) -> float | None:
-        """Largest distance of the settled walk, averaged over strides, from the circle that is
-        commanded, around the middle that it goes round [m]; None unless one command is a circle.
+        """Return the largest distance of the settled walk, averaged over strides, from the circle
+        that is commanded, around the middle that it goes round [m]; None unless one command is a
+        circle.
 
         The middle c solves |p|² = 2 p · c + k for the walk's points p by least squares.
         """
@@ -248,7 +250,8 @@ class Walk:
         return float(np.max(np.abs(np.linalg.norm(points - middle, axis=1) - radius)))
 
     def phase_at(self, time: float, left: int) -> float | None:
-        """The phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other one.
+        """Return the phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other
+        one.
 
         Between touchdowns it goes on at the pace of the step before. None before the third one, and
         where both feet land at once.
@@ -265,7 +268,7 @@ class Walk:
 
 
 def near(last: TrackingError, own: TrackingError) -> bool:
-    """The inequalities of `Walk.as_commanded`."""
+    """Return whether the inequalities of `Walk.as_commanded` hold."""
     slow, turned = last.speed - own.speed, last.turn - own.turn
     return bool(slow <= SPEED_TOLERANCE and turned <= TURN_TOLERANCE)
 

@@ -35,7 +35,7 @@ class Stage:
     physics: str = MUJOCO  #: engine that steps the robot, by its name or file
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
-        """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
+        """Return the agent of this name; `robot` if already loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
         duration = self.duration + (self.get_up or 0.0)
         given: dict[str, Any] = {"duration": duration, "pushes": None, "noise": self.noise,
@@ -49,7 +49,7 @@ class Stage:
         return load_agent(controller, robot, **given)
 
     def motion(self, name: str | None, robot: Robot | None = None) -> ReferenceMotion | None:
-        """The motion of this name, which a trial performs, or None. Raises ConfigError."""
+        """Return the motion of this name, or None without a name. Raises ConfigError."""
         if name is None:
             return None
         return load_motion(dict(self.motions)[name], robot or _robot(self.robot))

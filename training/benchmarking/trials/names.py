@@ -1,4 +1,4 @@
-"""Names that a user gives, checked before anything heavy is imported or compiled for them."""
+"""Checks of names from the user, before any slow import or compilation."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -114,7 +114,8 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
 def explained(
     env: BalanceEnv, trial: Trial, outcome: Outcome, course: CourseRecord, loss: str
 ) -> Outcome:
-    """The outcome of a lost trial with its diagnosis; `loss` is the criterion without a fall."""
+    """Return the outcome of a lost trial with its diagnosis; `loss` is the criterion without a
+    fall."""
     start = first_start(trial) or 0.0
     return replace(outcome, **asdict(diagnose(env, course.course(), start, loss)))
 
@@ -122,7 +123,8 @@ def explained(
 def rise_trial(
     env: BalanceEnv, trial: Trial, stepped: SteppedTrial, watch: Watch | None
 ) -> Outcome:
-    """The outcome of a trial that starts on the ground: `recovered` is to be up at its end."""
+    """Return the outcome of a trial that starts on the ground: `recovered` is to be up at its
+    end."""
     rising, settled = Rising(env), Settled()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
     while not stepped.done:
@@ -154,7 +156,7 @@ def first_start(trial: Trial) -> float | None:
 
 
 def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
-    """The outcome of a trial with commands, with the figures of its walk.
+    """Return the outcome of a trial with commands, with the figures of its walk.
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
     again, as near to the command as before the push (`Walk.as_commanded`), on a terrain to be
@@ -192,13 +194,13 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
 
 
 def _errors(whose: str, error: TrackingError | None) -> dict[str, Any]:
-    """The figures of an outcome that say how far a walk is from its command."""
+    """Return the figures of an outcome that say how far a walk is from its command."""
     speed, turn = (None, None) if error is None else map(_finite, error)
     return {f"{whose}_speed_error": speed, f"{whose}_turn_error": turn}
 
 
 def left_command(trial: Trial, outcome: Outcome) -> bool:
-    """Whether a walk was pushed, did not fall, and goes on otherwise than commanded."""
+    """Return whether a pushed walk did not fall but does not follow its command."""
     pushed = first_start(trial) is not None
     return pushed and outcome.last_speed_error is not None and not outcome.recovered
 
@@ -225,7 +227,7 @@ def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
 
 
 def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
-    """The outcome of a trial that performs a motion: `recovered` is to have not fallen."""
+    """Return the outcome of a trial that performs a motion: `recovered` is to have not fallen."""
     figures: dict[str, Any] = {
         name: _finite(value) for name, value in asdict(tracking.figures()).items()
     }
@@ -237,7 +239,7 @@ def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
 
 
 def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -> Outcome:
-    """The outcome that the environment has recorded."""
+    """Return the outcome recorded by the environment."""
     m = env.episode.metrics
     recovered = env.recovered and not env.fallen
     pushed = max((push.start for push in trial.pushes), default=0.0)
@@ -276,14 +278,14 @@ def drawn_robot(env: BalanceEnv) -> str | None:
 
 
 def surfaces_passed(env: BalanceEnv) -> int | None:
-    """The surfaces of the terrain, without the start's, of which the CoM has passed the beginning;
-    None on level ground."""
+    """Return the surfaces of the terrain, without the start's, of which the CoM has passed the
+    beginning; None on level ground."""
     surfaces, com = env.simulation.robot.terrain.surfaces(), env.simulation.state.com
     return sum(bool(com[0] > each.x_min) for each in surfaces[1:]) if surfaces else None
 
 
 def lean(env: BalanceEnv) -> float:
-    """The tilt of the root from the standing posture, whatever the yaw [°]."""
+    """Return the tilt of the root from the standing posture [°], independent of yaw."""
     standing = env.simulation.arrays.root_standing[2]
     cosine = float(env.simulation.state.root_axes[2] @ standing)
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))

@@ -36,7 +36,7 @@ AS_JSON = ("later", "commands", "kicks", "terrain")  # of all other columns a ce
 
 
 def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell]:
-    """The line of a trial and a controller.
+    """Return the line of a trial and a controller.
 
     `later` has the pushes after the first as JSON, `commands` and `kicks` all of these, `terrain`
     its fields.
@@ -62,12 +62,12 @@ def _many(items: Sequence[Any]) -> str | None:
 
 
 def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
-    """The columns of an outcome."""
+    """Return the columns of an outcome."""
     return dict(zip(OUTCOME_COLUMNS, asdict(outcome).values(), strict=True))
 
 
 def read_outcome(line: Mapping[str, str], path: Path) -> Outcome:
-    """The outcome of a line; raises ConfigError where it does not parse. A column that older
+    """Return the outcome of a line; raise ConfigError where it does not parse. A column that older
     results lack is a field's default, and so is an empty cell."""
     cells: dict[str, Any] = {}
     for column, (name, hint) in zip(OUTCOME_COLUMNS, get_type_hints(Outcome).items(), strict=True):

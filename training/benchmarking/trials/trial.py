@@ -18,7 +18,7 @@ class Conditions:
     delay: float = 0.0  #: of the sensors [s]
     mass_error: float = 0.0  #: relative error of all masses in the controller's model
     velocity_noise: float = 0.0  #: standard deviation of measured joint velocities [rad/s]
-    #: name or file of a level, in which the other fields have the last word; None: ideal
+    #: name or file of a realism level, which the other fields override; None: ideal
     realism: str | None = None
 
 
@@ -40,13 +40,13 @@ class Trial:
     #: which factor it varies; "standard" for the case that others are compared with
     factor: str | None = None
     level: str | None = None  #: the factor's value, as text
-    #: that a controller that walks follows, in the order of time; none: it stands
+    #: of a walk, in order of time; empty: the robot stands
     commands: tuple[TimedCommand, ...] = ()
     kicks: tuple[Kick, ...] = ()  #: sudden changes of the root's velocity
     terrain: Terrain | None = None  #: None: that of the environment
-    #: that is performed, by its name in the suite; None: that of the environment
+    #: reference motion by its name in the suite; None: that of the environment
     motion: str | None = None
-    share: float | None = None  #: of the controller's J50 that the push is
+    share: float | None = None  #: impulse of the push over the controller's J50
     until: float | None = None  #: when it ends [s]; None: when those of its suite do
     #: number of the posture on the ground that it starts from; None: it starts on its feet
     start: int | None = None
@@ -64,7 +64,7 @@ class Trial:
 
     @property
     def judged_by_falls(self) -> bool:
-        """Whether it is won by not falling: a walk, but for one that is to get across a terrain."""
+        """Whether it is won by not falling: a walk on level ground."""
         return bool(self.commands) and self.terrain is None
 
     @property
@@ -78,11 +78,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialFigures:
-    """The figures of a trial. Distances [m], times [s]; None where there is no such value, or
-    where a simulation has blown up.
+    """The figures of a trial. Distances [m], times [s]; None without such a value, or
+    where the simulation has diverged.
 
-    Of a walk the strides count, two steps each, that begin 4 s or more after the last change of the
-    command and end a second or more before a fall, and the steps that end them.
+    Of a walk only strides (two steps) count that begin at least 4 s after the last change of the
+    command and end at least 1 s before a fall, and the steps that end them.
     """
 
     #: upright, quiet and with feet at rest for the last second; of a walk that goes on, not fallen,
@@ -149,21 +149,21 @@ class TrialFigures:
     #: mean |τ|/m of the stance leg's knee on one foot, at the ends of policy steps [N·m/kg]
     knee_mean: float | None = None
     knee_peak: float | None = None  #: the largest
-    #: of one command that is a circle, largest distance of the walk from it, around the middle that
-    #: the walk goes round
+    #: of a single circular command, largest distance of the walk from that circle around the walk's
+    #: own centre
     circle_error: float | None = None
-    foot_slide: float | None = None  #: largest way of a sole that bears the robot alone
+    foot_slide: float | None = None  #: largest displacement of a sole in single support
     #: phase of the stride at the start of the first push or kick: 0 where the left foot lands, 0.5
     #: where the right one does
     push_phase: float | None = None
-    #: largest distance of a stride's velocity from the command before the first push or kick, else
-    #: without it, see `Walk.own_error` [m/s]; of a walk that is pushed
+    #: of a pushed walk, largest error of a stride's velocity before the first push or kick, else
+    #: without it, see `Walk.own_error` [m/s]
     own_speed_error: float | None = None
     own_turn_error: float | None = None  #: the same of the turn rate [rad/s]
     #: distance of the last two strides' mean velocity from the command [m/s]; None after a fall
     last_speed_error: float | None = None
     last_turn_error: float | None = None  #: the same of the turn rate [rad/s]
-    edge_contacts: int = 0  #: times that a foot came to touch an edge of the terrain
+    edge_contacts: int = 0  #: new contacts of a foot with an edge of the terrain
     #: of a terrain, of which the CoM has passed the beginning; stairs climbed
     surfaces_passed: int | None = None
     #: from here to `interruptions`: of a motion that is performed, see `TrackingFigures`
@@ -184,7 +184,7 @@ class TrialFigures:
     up_time: float | None = None  #: from the fall, or the start on the ground, until it was up
     #: parameters of a randomised robot as JSON, see `DrawnRobot.summary`
     drawn: str | None = None
-    #: what the controller raised, on one line; the trial then counts as not recovered
+    #: exception of the controller on one line; the trial then counts as not recovered
     error: str | None = None
 
     @property
@@ -195,7 +195,7 @@ class TrialFigures:
 
 @dataclass(frozen=True)
 class Outcome(Diagnosis, TrialFigures):
-    """The outcome of a trial: its figures, then why it was lost, of which a recovered one has none.
+    """The outcome of a trial: its figures and, if it was lost, the diagnosis.
 
     Bases are listed from the last field to the first, as dataclasses collect them.
     """
@@ -208,5 +208,5 @@ def won(trial: Trial, outcome: Outcome) -> bool:
 
 
 def failed(error: Exception) -> Outcome:
-    """The outcome of a trial in which the controller raised."""
+    """Return the outcome of a trial in which the controller raised."""
     return Outcome(recovered=False, fallen=False, error=raised(error), loss="error")

@@ -1,4 +1,4 @@
-"""An agent in the standard conditions, and in others."""
+"""Agents under standard and other conditions."""
 
 from functools import cache
 from typing import Any
@@ -34,9 +34,9 @@ def level_of(conditions: Conditions) -> Realism:
 
 
 class AgentVariants:
-    """One agent under several conditions, whose environment is the same in all of them.
+    """One agent under several conditions, in one environment.
 
-    The realism of the environment is that of the conditions, whatever it was before.
+    The environment's realism is set by the conditions.
     """
 
     def __init__(self, agent: Agent):
