@@ -15,7 +15,7 @@ from poise.training.benchmarking.diagnosis.diagnosis import (
     Diagnosis,
     _capture,
     _foothold,
-    _full,
+    _saturated,
     distance_outside,
     touching_body,
 )
@@ -87,9 +87,9 @@ def test_the_first_motor_at_its_limit_after_the_push() -> None:
         1.0,
         1.0,
     )
-    told = _full(ENV, found, start=0.04)
+    told = _saturated(ENV, found, start=0.04)
     assert told == {"full_motor": "ankle", "full_from": 0.1, "full_time": 0.08}
-    assert _full(ENV, course(), start=0.0) == {}
+    assert _saturated(ENV, course(), start=0.0) == {}
 
 
 def test_the_capture_point_leaves_for_the_last_time() -> None:
