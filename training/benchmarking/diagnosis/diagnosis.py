@@ -22,7 +22,7 @@ MISSED = 0.05  # [m] from touchdown to the planned foothold
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Why a trial was lost; times in s after the reset, None where there is no such thing."""
+    """Why a trial was lost; times in s after the reset, None where it does not apply."""
 
     #: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far), "contact"
     #: (more than the feet on the ground), "diverged" (numbers too large), "not quiet" (on its feet,

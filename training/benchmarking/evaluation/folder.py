@@ -38,11 +38,11 @@ class Settings:
     suite_name: str  #: as typed by the user
     suite: dict[str, Any]  #: its fields
     robot: str  #: name or path, as typed by the user
-    robot_fingerprint: str  #: of what was loaded
+    robot_fingerprint: str  #: of the loaded robot
     seed: int = field(metadata={"min": 0})  #: of the trials
-    limits: LimitTable | None  #: what pushes are measured by; None: the ankle limit
-    versions: dict[str, str]  #: of what computes the result
-    controllers: dict[str, str]  #: name → fingerprint, in the order in which they came
+    limits: LimitTable | None  #: reference impulses of pushes; None: the ankle limit
+    versions: dict[str, str]  #: of Python and the libraries
+    controllers: dict[str, str]  #: name → fingerprint, in order of addition
     #: name → hash of the motions that are performed
     motions: dict[str, str] = field(default_factory=dict, metadata={"omit": "default"})
 
@@ -57,9 +57,9 @@ class ResultFolder:
         path: the folder; made if missing.
         settings: of this result.
         overwrite: remove what an earlier result has left there.
-        closed: whether no controllers can be added, because trials depend on who takes part.
+        closed: whether no controllers can be added, as trials depend on the set of controllers.
         ready: called with the settings of the whole folder before anything is written; what it
-            raises leaves the folder as it was.
+            raises leaves the folder unchanged.
 
     Raises:
         ConfigError: the folder holds something else, and `overwrite` is off; nothing is written.
@@ -108,7 +108,7 @@ class ResultFolder:
         self.close()
 
     def _check(self, closed: bool) -> Settings:
-        """Refuse to go on from anything but this result; returns its settings."""
+        """Raise ConfigError unless the folder holds this result; return its settings."""
         path = self.path
         fixed = [name for name in Settings.__dataclass_fields__ if closed or name != "controllers"]
         before = _check_same(path, {name: getattr(self.settings, name) for name in fixed})
@@ -124,7 +124,7 @@ class ResultFolder:
 
 
 def check_folder(path: Path, known: Mapping[str, object], overwrite: bool) -> None:
-    """Refuse, before anything is loaded, what `ResultFolder` would for the settings `known`.
+    """Raise the errors of `ResultFolder` for the settings `known`, before anything is loaded.
 
     Raises ConfigError and PoiseError as `ResultFolder`.
     """
@@ -139,7 +139,7 @@ def holds_files(path: Path) -> bool:
 
 
 def _check_same(path: Path, known: Mapping[str, object]) -> Settings:
-    """Refuse to go on from a result whose settings are not those `known`; returns them all."""
+    """Raise ConfigError unless the result has the settings `known`; return all of them."""
     if not (path / SETTINGS).exists():
         raise ConfigError(f"holds files of something else: {ADVICE}", source=path, field="out")
     before = read_settings(path)
@@ -167,7 +167,7 @@ def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:
 
 
 def read_settings(folder: Path) -> Settings:
-    """Return the settings of a result; raise ConfigError where there are none, or of another
+    """Return the settings of a result; raise ConfigError where they are missing or of another
     format."""
     path = folder / SETTINGS
     data = read_yaml(path)

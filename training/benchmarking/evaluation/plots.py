@@ -37,7 +37,7 @@ from poise.training.pictures.figures.rates import fall_probability
 from poise.training.pictures.figures.series import SIDES, Series, series
 from poise.training.running.files import CURVE, PLOTS
 
-FEWEST = 5  # trials of a direction whose J50 is drawn
+FEWEST = 5  # trials of a direction whose J50 is plotted
 
 
 def draw_plots(
@@ -138,7 +138,7 @@ def _series(fits: Mapping[str, EnvelopeFit]) -> list[Series]:
 
 
 def _left_out(fits: Mapping[str, EnvelopeFit]) -> str:
-    """What is not drawn, in words; empty where all is."""
+    """Return a note on missing directions; empty where all are plotted."""
     enough = [_enough(f) for fit in fits.values() for f in fit.fits]
     if not any(enough):
         return f"Nothing is drawn: no direction has {FEWEST} trials."

@@ -66,7 +66,7 @@ def ranked(entries: Mapping[str, Entry]) -> list[str]:
 def places(
     entries: Mapping[str, Entry], measure: tuple[str, str] | None = None
 ) -> dict[str, int | None]:
-    """Return the rank of each controller; those whose results print alike share one.
+    """Return the rank of each controller; equal printed results share one.
 
     None for those with an external force at a soft root, or without a value of the `measure`: a key
     and its print format, by default that of `ranked`.
@@ -149,7 +149,7 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     if STEPS_TAKEN.heading in headings:
         notes.append(f"{STEPS_TAKEN.heading}: of all trials, those that were lost too")
     of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
-    if FAILURES.heading in headings and None not in of_won:  # results of old have none
+    if FAILURES.heading in headings and None not in of_won:  # older results lack it
         notes.append(f"{FAILURES.heading}: ticks of all trials, also of robots that were falling; "
                      f"{sum(filter(None, of_won))} in trials that were recovered")  # fmt: skip
     p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]

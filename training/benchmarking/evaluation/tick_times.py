@@ -34,8 +34,8 @@ class Clocked(WrappedController):
 
 @contextlib.contextmanager
 def clocked(env: BalanceEnv) -> Iterator[list[float]]:
-    """The seconds that each call of the environment's controller takes, as long as this is open;
-    none of an environment without one."""
+    """The seconds that each call of the environment's controller takes, inside the context;
+    none without a controller."""
     if not isinstance(env, ResidualBalanceEnv):
         yield []
         return
@@ -50,7 +50,7 @@ def clocked(env: BalanceEnv) -> Iterator[list[float]]:
 def tick_times(agents: dict[str, Agent]) -> dict[str, float | None]:
     """Return the median time of a control tick [µs] from Python; None for a controller that raises.
 
-    For a policy the time of one of its actions is shared among the ticks that it is held for.
+    For a policy, the time of an action is divided among the ticks for which it is held.
     """
     clocks = {name: _Clock(agent) for name, agent in agents.items()}
     for turn in range(ROUNDS):

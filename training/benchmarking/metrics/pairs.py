@@ -1,4 +1,4 @@
-"""Two controllers compared: on the trials that both met, and by their mean J50."""
+"""Two controllers compared: on their common trials, and by their mean J50."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -16,9 +16,9 @@ from .evaluated import DIRECTIONAL, Evaluated, part, pushes, rated, won
 def pair_figures(
     a: str, b: str, evaluated: Mapping[str, Evaluated], entries: Mapping[str, Entry]
 ) -> Pair:
-    """b against a: McNemar on the rated trials that both met, and on all; gain in mean J50.
+    """Compare b with a: McNemar's test on the common rated trials and on all, gain in mean J50.
 
-    The gain is paired, with one for each direction, where both met the same pushes.
+    The gain is paired, and given for each direction, where both had the same pushes.
     """
     met = alike(evaluated[a], evaluated[b])
     every, rated_numbers = paired(met), {trial.number for trial, _ in rated(evaluated[a])}

@@ -22,7 +22,7 @@ def walk_levels(evaluated: Evaluated, duration: float) -> list[WalkLevel]:
     """Return the levels of the parts that walk, in the order of the suite; trials last `duration`
     [s].
 
-    Of pushes whose J50 is measured, those that all controllers meet.
+    Of pushes whose J50 is measured, only the first stage, common to all controllers.
     """
     walked = met_by_all(part(evaluated, *WALKING))
     found = cells(walked, lambda trial: (trial.part, str(trial.level)))

@@ -46,8 +46,8 @@ class Change:
 
 @dataclass(frozen=True)
 class Comparison:
-    """`settings` are the fields that differ; controllers: in one only, changed, or alike in every
-    trial, which have no `changes` then."""
+    """The differing `settings`; controllers in one result only, changed, or identical in all trials
+    (these have no `changes`)."""
 
     settings: tuple[str, ...]
     only_a: tuple[str, ...]
@@ -60,8 +60,8 @@ class Comparison:
 def compare(a: str | Path, b: str | Path) -> Comparison:
     """Compare two folders written by `poise evaluate` or `poise benchmark`.
 
-    Rates of trials that both have, alike in all, are compared in pairs (McNemar, Newcombe); all
-    else by the intervals of the two figures [Zou08].
+    Rates of common trials are compared in pairs (McNemar, Newcombe), all other figures by their
+    intervals [Zou08].
 
     Raises ConfigError for a folder that holds no finished result.
     """

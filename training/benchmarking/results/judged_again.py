@@ -29,10 +29,10 @@ def judged_again(
     """Return the summary, in which the walks of an older result are judged by falls.
 
     Such a result counted walks as lost that stayed upright, but differed from their command by more
-    than 0.05 m/s or 5°. Its columns say who fell: J50, the ranking and pairs are computed again
+    than 0.05 m/s or 5°. Its columns contain the falls: J50, ranking and pairs are computed again
     from `lines` of trials.csv. The rate of `recovered` stays as it was judged, since older columns
     have no error of the last strides. Figures over training seeds and over the limits of steps are
-    left out. A `PoiseWarning` says so, or why it could not be done.
+    left out. A `PoiseWarning` reports this, or why it failed.
     """
     known = summary["controllers"].values()
     if not any("walks" in entry and "criterion" not in entry for entry in known):

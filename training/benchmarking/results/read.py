@@ -40,7 +40,7 @@ class Record:
     fraction: float  #: impulse over the limit of the suite; NaN where it has none
     fall_time: float  #: [s] after the reset; NaN without a fall
     start: float | None  #: of the first push [s]; None without one
-    #: why it was lost, in words; empty of a trial that was recovered, and of older results
+    #: why it was lost, in words; empty for a recovered trial and in older results
     why: str
     line: Mapping[str, str]  #: all columns of trials.csv, as they are written there
 
@@ -76,7 +76,7 @@ class Record:
 
     @cached_property
     def met(self) -> tuple[str, ...]:
-        """Equal for two controllers that met the same: trials of one number may differ."""
+        """Key of the trial's content: trials of one number may differ between controllers."""
         return tuple(self.line.get(name, "") for name in CASE_COLUMNS if name != "controller")
 
 

@@ -57,7 +57,7 @@ def replay(
         video: an MP4 or WebP file to write, see `film`.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
         watch: called with the environment after the reset and after every step.
-        allow: controllers from outside (``module:Class``) that may run.
+        allow: external controllers (``module:Class``) that may run.
 
     Raises:
         ConfigError: no finished result there, no such trial or controller, or a controller or
@@ -114,7 +114,7 @@ def film(
         fps: frames a second that are wanted [1/s]; None: as of `record`.
         size: width and height of each picture [pixels]; None: as of `record`, but `NARROW` of
             several that are no WebP.
-        allow: controllers from outside (``module:Class``) that may run.
+        allow: external controllers (``module:Class``) that may run.
 
     Raises:
         ConfigError: as `replay`, and for a path or size that is not valid.
@@ -135,7 +135,7 @@ def film(
 
 @contextmanager
 def _opened(folder: str | Path | Results, allow: str | Iterable[str]) -> Iterator[Results]:
-    """What a folder holds; meanwhile the controllers from outside may run that are allowed."""
+    """Open the results of a folder; inside, the allowed external controllers may run."""
     path = folder.folder if isinstance(folder, Results) else Path(folder)
     with allowing(allow, source=path / SETTINGS):
         yield folder if isinstance(folder, Results) else load_results(path)

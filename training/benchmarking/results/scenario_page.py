@@ -14,7 +14,7 @@ from poise.training.running.trial_figures import ScenarioFigures
 
 from .pages import Table, check_alike, page_of
 
-WALK = "walk"  # the scenario that only some play
+WALK = "walk"  # the scenario with a command
 Figures = Mapping[str, object]
 
 

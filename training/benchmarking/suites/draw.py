@@ -44,7 +44,7 @@ class Standard:
 
 
 class Marks(TypedDict, total=False):
-    """Fields that say which place a trial has in its part, its conditions, and how it walks."""
+    """Optional fields of a trial: its place in its part, its conditions, its walk."""
 
     stage: int
     factor: str | None
@@ -142,8 +142,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a suite: trials of one kind. Their `part` is the name that the suite has for it,
-    but where they have one already."""
+    """A part of a suite: trials of one kind. Their `part` is its name in the suite, unless set."""
 
     SIZE: ClassVar[str] = "trials"  # the field that says how many
 

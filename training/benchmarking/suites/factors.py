@@ -52,7 +52,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Factors(Part):
-    """One factor at a time; every level meets the same starts, directions and fractions."""
+    """One factor at a time; all levels share starts, directions and fractions."""
 
     trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})  # per level
     fractions: Range = field(default=(0.4, 1.0), metadata={"above": 0.0})  # of the ankle limit
@@ -62,7 +62,7 @@ class Factors(Part):
         check_rising(self.fractions, "fractions")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        """Cell by cell, the standard case first; all cells draw alike."""
+        """Return the trials by cell, the standard case first; all cells share random numbers."""
         drawn = draw.stratified(number, self.trials, self.fractions)
         trials: list[Trial] = []
         for cell in self._cells(draw):
@@ -91,7 +91,7 @@ class Factors(Part):
 
 @dataclass(frozen=True)
 class Mix(Part):
-    """All factors drawn at once. Durations are drawn evenly on a logarithmic scale."""
+    """All factors sampled at once, durations evenly on a logarithmic scale."""
 
     trials: int = field(default=160, metadata={"min": 1, "max": MOST_TRIALS})
     fractions: Range = field(default=(0.3, 1.1), metadata={"above": 0.0})

@@ -58,9 +58,9 @@ class Sustained(Part):
 
 @dataclass(frozen=True)
 class Gusts(Sequence):
-    """Short pushes one after the other, all within `pushes.spread` of a side that the trial draws.
+    """A sequence of short pushes within `pushes.spread` of a random side of the trial.
 
-    See `Sequence` for what pushes are measured by.
+    See `Sequence` for the units of pushes.
     """
 
     trials: int = field(default=60, metadata={"min": 1, "max": MOST_TRIALS})

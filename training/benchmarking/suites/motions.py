@@ -1,4 +1,4 @@
-"""The part of suites in which motions are performed, pushed by shares of the controller's J50."""
+"""The part of performed motions, pushed by shares of the controller's J50."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -100,7 +100,7 @@ class Motions(Part):
         return LimitTable(tuple(self._standing.angles), tuple(rough))
 
     def _cells(self, draw: Draw, number: int, j50: LimitTable, stage: int = 1) -> list[Trial]:
-        """All trials of the motions; what is drawn goes by motion, direction and repeat alone."""
+        """Return all trials of the motions, seeded by motion, direction and repeat only."""
         trials: list[Trial] = []
         for share, (motion, name) in product(self.shares, enumerate(self.labels)):
             for k in range(self.directions * self.trials):

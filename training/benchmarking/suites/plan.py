@@ -26,8 +26,8 @@ class _Planned(NamedTuple):
     part: Part
     level: str | None  # None: the suite's own
     first: list[Trial]  # of the first stage
-    second: int  # the number that the second stage is drawn by
-    shift: int  # from the numbers that its trials are drawn by to their own
+    second: int  # number that seeds the second stage
+    shift: int  # from the seeding numbers of its trials to their own
 
 
 class Plan:
@@ -60,7 +60,7 @@ class Plan:
         self._parts: list[_Planned] = []
         number = 0
         for level in (None, *suite.levels):
-            drawn = 0  # every level draws alike
+            drawn = 0  # all levels share random numbers
             for name, part in suite.parts.items():
                 first = part.first(self._draw, drawn)
                 second = drawn + len(first)

@@ -1,7 +1,6 @@
 """Parts of random pushes, of several in a trial, and of none.
 
-A trial depends on the seed and its number alone, so more of them leave the first ones as they
-were.
+A trial depends only on the seed and its number, so adding trials does not change the others.
 """
 
 from dataclasses import dataclass, field, replace
@@ -91,7 +90,7 @@ def sampled(
 ) -> list[Push]:
     """Return the pushes of a trial, of `bodies` where the sampler names none.
 
-    What is a fraction of J50 is one of the ankle limit where no J50 of the robot was measured.
+    A fraction of J50 is one of the ankle limit if the robot has no measured J50.
     """
     limits = draw.limits
     sampler = replace(sampler, bodies=sampler.bodies or bodies)

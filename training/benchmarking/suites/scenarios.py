@@ -1,6 +1,7 @@
-"""The part of everyday trials, by name: each with a length, pushes, a walk and a level of its own.
+"""The part of everyday scenarios by name, each with its own duration, pushes, walk and level.
 
-The k-th trial of every scenario has the same seed: those of equal pushes meet the same ones.
+The k-th trial of every scenario has the same seed: scenarios with equal
+settings have the same pushes.
 """
 
 from dataclasses import dataclass, field, replace

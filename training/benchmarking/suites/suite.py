@@ -58,7 +58,7 @@ class Suite(Standard):
         if self.walk_push is not None and (self.envelope or self.grid):
             raise ValueError("walk_push: J50 is that of a walk or of standing, not of both")
         if self.motions is not None and len(self.parts) > 1:
-            raise ValueError("motions: must be the only part: what a fall is, depends on them")
+            raise ValueError("motions: must be the only part: they define what a fall is")
         if self.scenarios is not None and (len(self.parts) > 1 or self.levels):
             raise ValueError("scenarios: must be the only part, each of them at its own level")
         if self.scenarios is not None and self.scenarios.duration > self.duration:

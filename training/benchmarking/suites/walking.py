@@ -116,9 +116,9 @@ class Walking:
 
 @dataclass(frozen=True)
 class WalkPush(Walking, Envelope):
-    """J50 in each of many directions while it walks, as an `Envelope` finds it, at all phases.
+    """J50 of a walk in each of many directions, as in an `Envelope`, over all phases of the gait.
 
-    What counts is not to fall, see `Trial.judged_by_falls`.
+    Trials are judged by falls, see `Trial.judged_by_falls`.
     """
 
     def first(self, draw: Draw, number: int) -> list[Trial]:

@@ -66,15 +66,15 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     Args:
         name: a packaged controller or a path to a ``.yaml`` of one (run with action zero),
             a packaged policy (``residual``), ``zero`` (no torque at all), a folder written by
-            ``poise train``, a policy from outside (an ONNX file, or a folder with a
+            ``poise train``, an external policy (an ONNX file, or a folder with a
             ``deploy.yaml``), ``module:Class`` or ``file.py:Class`` of a controller or a policy, or
             a guard (a packaged one or its ``.yaml``).
         robot: that is controlled. A policy must have been trained on it.
         overrides: arguments of the environment, or fields of its `EnvConfig`.
 
     Raises:
-        ConfigError: no such controller, or one that is not valid or is for another robot; or one
-            from outside that the user has not allowed, see `allowing`.
+        ConfigError: no such controller, or one that is not valid or is for another robot; or
+            an external one that the user has not allowed, see `allowing`.
     """
     check_name(name)
     if name == NO_CONTROL:
@@ -93,8 +93,8 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
 def code_of(name: str) -> list[str]:
     """Return what a command must allow by ``--allow`` to load the agent of this name.
 
-    That is the class from outside or the file of TorchScript that the name, or the file or the
-    folder of this name, leads to. Nothing runs that is not allowed here.
+    That is the external class or TorchScript file to which the name, or the file or folder of this
+    name, refers. Code that is not allowed does not run here.
     """
     if is_plugin(name):
         return [name]
@@ -111,7 +111,7 @@ def code_of(name: str) -> list[str]:
 
 
 def check_walks(name: str, agent: Agent, source: str) -> None:
-    """Raise ConfigError unless the controller of an agent walks; `source` is what asks for it."""
+    """Raise ConfigError unless the controller of an agent walks; `source` requires it."""
     if not can_walk(agent):
         raise does_not_walk(name, source)
 
@@ -125,8 +125,7 @@ def check_may_walk(name: str, source: str) -> ControllerConfig | None:
     """Return the configuration of a controller that is described by a packaged name or a file, or
     None.
 
-    Raises ConfigError as `check_walks` where that tells that it does not walk: nothing is compiled
-    for it.
+    Raises ConfigError as `check_walks` if that configuration does not walk; nothing is compiled.
     """
     check_name(name)
     described = name in packaged("controllers") or Path(name).suffix in (".yaml", ".yml")
@@ -139,7 +138,7 @@ def check_may_walk(name: str, source: str) -> ControllerConfig | None:
 
 
 def does_not_walk(name: str, source: str) -> ConfigError:
-    """Return the error of a controller that does not walk where `source` asks for one that does."""
+    """Return the error of a controller that does not walk where `source` requires one that does."""
     return ConfigError(f"the controller {shown(name)} does not walk", source=source,
                        field="controller", choices=walking_controllers())  # fmt: skip
 

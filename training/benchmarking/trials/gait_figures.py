@@ -16,7 +16,7 @@ SETTLING = 4.0  # [s] after a change of the command, from which strides are comp
 SPEED_TOLERANCE, TURN_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad/s] beyond its own error
 FALLING = 1.0  # [s] before a fall, in which strides are part of the fall
 STOPPED = 1.0  # [s] without a touchdown, after which a robot does not walk any more
-SLOW = 0.1  # [m/s] below which a cost of transport says nothing
+SLOW = 0.1  # [m/s] below which the cost of transport is undefined
 WINDOW = 4  # steps, two strides, by which the end of a walk is judged
 
 
@@ -132,8 +132,8 @@ class Walk:
         """Return the distance of the mean velocity over the last two strides from the command,
         along their mean heading.
 
-        None where there are no four steps between touchdowns, the last one in the last second: it
-        does not walk any more.
+        None without four steps between touchdowns, the last one in the last second: the walk has
+        stopped.
         """
         rows, r = self.landed.row, self.record
         if len(rows) <= WINDOW or r.time[-1] - r.time[rows[-1]] > STOPPED:
@@ -253,7 +253,7 @@ class Walk:
         """Return the phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other
         one.
 
-        Between touchdowns it goes on at the pace of the step before. None before the third one, and
+        Between touchdowns it advances at the pace of the last step. None before the third one, and
         where both feet land at once.
         """
         rows, feet, times = self.landed.row, self.landed.foot, self.record.time

@@ -82,7 +82,7 @@ def steps_of(
     across it [m]; `swing_time` from lift-off to touchdown [s]; `step_clearance` of the sole's
     middle at its highest above where it lands [m]. `way` and `apart` are from sole to sole when the
     other one lifts off, along the velocity that is commanded and across the heading [m]: feet that
-    land fast go on for a centimetre.
+    land fast slide on for a centimetre.
     """
     measures = [
         _step(record, row, foot, yaw, command_at(record.time[row]))

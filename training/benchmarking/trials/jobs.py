@@ -76,7 +76,7 @@ def play(job: Job) -> Outcome:
         return run_trial(agent, job.trial)
     except MemoryError:  # of this process, not of the controller
         raise
-    except Exception as error:  # a controller from outside may raise anything
+    except Exception as error:  # an external controller may raise anything
         del _variants[job.stage, job.controller]  # it may be broken: the next trial gets a new one
         return failed(error)
 

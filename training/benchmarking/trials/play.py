@@ -33,7 +33,7 @@ Watch = Callable[[BalanceEnv], object]  # called after the reset and after every
 
 
 class SteppedTrial:
-    """A trial that begins when this is made, and goes on step by step.
+    """A trial that begins on construction and is advanced step by step.
 
     Attributes:
         done: whether it has ended, by a fall or by time.
@@ -64,7 +64,7 @@ class SteppedTrial:
         return action
 
     def rise(self, duration: float) -> Rise:
-        """Go on for `duration` [s] with a robot that is down, at most until it is up again."""
+        """Continue for `duration` [s] with a fallen robot, at most until it is up again."""
         env, rising = self._agent.env, Rising(self._agent.env)
         for _ in range(round(duration / env.config.policy_period)):
             if not env.episode.running[0] or rising.held:
@@ -160,7 +160,7 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
     again, as near to the command as before the push (`Walk.as_commanded`), on a terrain to be
-    beyond its last edge; there is no time of recovery then, and no drift.
+    beyond its last edge; it then has no recovery time and no drift.
     """
     assert isinstance(env, CommandedEnv)  # it has taken the commands
     walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
@@ -273,7 +273,7 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
 
 
 def drawn_robot(env: BalanceEnv) -> str | None:
-    """What the episode's robot was drawn as, as JSON; None where it is the one that is known."""
+    """Return the parameters of the episode's randomised robot as JSON; None without any."""
     return None if env.drawn is None else json.dumps(env.drawn.summary(env.arrays.timestep))
 
 

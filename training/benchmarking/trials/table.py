@@ -1,4 +1,4 @@
-"""Trials and outcomes as lines of trials.csv: what is written reads back exactly."""
+"""Trials and outcomes as lines of trials.csv, which are read back exactly."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
