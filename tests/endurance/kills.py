@@ -166,7 +166,7 @@ def _kill_and_go_on(
         again = Running(command.line(out))
         assert again.wait() == 0, again.output[-2000:]
         if command.name in ("evaluate", "benchmark", "policies", "walk") and kept:
-            assert f"going on after {kept} finished" in again.output, again.output
+            assert f"continuing after {kept} finished" in again.output, again.output
         told += f", {kept} kept"
     result, expected = command.result(out), [whole.result(command, stopped)]
     if died:  # one of the runs; the others were not disturbed

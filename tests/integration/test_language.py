@@ -17,7 +17,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-GLOBS = ("*.md", "docs/*.md", "configs/**/*.yaml", "examples/*.py", ".github/ISSUE_TEMPLATE/*.yml")
+GLOBS = (
+    *("*.md", "docs/*.md", "configs/**/*.yaml", "examples/*.py", ".github/ISSUE_TEMPLATE/*.yml"),
+    *(f"training/{folder}/**/*.{kind}" for folder in ("benchmarking", "running")
+      for kind in ("py", "j2")),
+)  # fmt: skip
 OTHERS = {"CHANGELOG.md", "docs/seeds.md"}  # of its days; is being rewritten
 
 #: private word or phrase (a regular expression, whatever the case) → the field's
@@ -59,6 +63,10 @@ MEANT = {
     "docs/leaderboard-booster_t1.md": ("of the mix",),
     "docs/leaderboard-unitree_g1.md": ("of the mix",),
     "docs/leaderboard-unitree_h1.md": ("of the mix",),
+    # a key of summary.json
+    "training/benchmarking/metrics/entry.py": ('"played"',),
+    "training/benchmarking/results/read.py": ('"played"', "'played'"),
+    "training/running/summary.py": ("`played`", "played: Required"),
 }
 
 #: names that stand for a file of the reader

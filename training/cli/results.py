@@ -112,7 +112,7 @@ def replay(
 
 def _print_replay(done: "Replay") -> None:
     """How a trial ended that was played again, why, and in what it differs from its record."""
-    from poise.training.benchmarking.diagnosis.words import push_told, why
+    from poise.training.benchmarking.diagnosis.words import push_text, why
 
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
     if done.outcome.loss == "off command":
@@ -120,7 +120,7 @@ def _print_replay(done: "Replay") -> None:
     print(f"trial {done.trial.number}, {done.controller}: {end}")
     events: list[Push | Kick] = [*done.trial.pushes, *done.trial.kicks]
     events.sort(key=lambda each: each.start)
-    print("; ".join(map(push_told, events)) or "no push")
+    print("; ".join(map(push_text, events)) or "no push")
     if reason := why(done.outcome, done.outcome.fall_time):
         print(reason)
     for name, (recorded, now) in done.differences.items():

@@ -1,7 +1,7 @@
-"""What the figures of a result are called and how they are written, in every table of it.
+"""Names, units, digits and meanings of all figures of a result.
 
-The terminal, the leaderboard (Markdown) and the report (HTML and CSV) take names, units, digits and
-words from here. `summary.json` and the CSV files have the figures in SI units.
+The terminal, the leaderboard (Markdown) and the report (HTML and CSV) use them. `summary.json` and
+the CSV files hold the figures in SI units.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 from .trial_figures import Interval
 
 NONE = "–"
-#: what a figure is only a bound of, or whether it is one from below → before it
+#: kind of bound, or whether it is a lower bound → sign before the figure
 SIGNS = {None: "", "lower": "≥ ", "upper": "≤ ", True: "≥ ", False: ""}
 Entry = Mapping[str, Any]
 
@@ -24,16 +24,16 @@ class Figure:
 
     Attributes:
         key: in the entry.
-        name, unit: of it; people read both.
-        form: format in which it is written.
-        words: what it means.
-        scale: SI units times this are `unit`.
-        ends: key of its 95 % interval.
-        of: key of the count that it is a part of; the terminal then says "2 of 9".
-        beside: key of a count that is told with it; the terminal then says "2, 9".
-        bound: key of what it is only a bound of.
-        csv: its name in the report's CSV files, where it is not `key`.
-        where: whether an entry is one that the figure says something of; not given: all are.
+        name, unit: of the heading.
+        form: format specification.
+        words: meaning.
+        scale: factor from SI units to `unit`.
+        ends: key of the 95 % interval.
+        of: key of the total of a count; the terminal prints "2 of 9".
+        beside: key of a second count; the terminal prints "2, 9".
+        bound: key of the kind of bound.
+        csv: name in the report's CSV files, where it is not `key`.
+        where: whether the figure applies to an entry; None: to all.
     """
 
     key: str
@@ -55,21 +55,21 @@ class Figure:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def value(self, entry: Entry) -> float | None:
-        """The figure in SI units; None where the entry has none."""
+        """Return the figure in SI units; None where the entry has none."""
         if self.where is not None and not self.where(entry):
             return None
         return cast("float | None", entry.get(self.key))
 
     def interval(self, entry: Entry) -> Interval | None:
-        """Its 95 % interval in SI units."""
+        """Return the 95 % interval in SI units, or None."""
         return cast("Interval | None", entry.get(self.ends)) if self.ends else None
 
     def sign(self, entry: Entry) -> str:
-        """≥ or ≤ where it is only a bound."""
+        """Return ≥ or ≤ of a bound, else an empty text."""
         return SIGNS[entry.get(self.bound)] if self.bound else ""
 
     def text(self, entry: Entry) -> str:
-        """With sign and interval, as the terminal has it; "–" where there is none."""
+        """Return the figure with sign and interval, as in the terminal; "–" where it is missing."""
         value = self.value(entry)
         if value is None:
             return NONE
@@ -80,19 +80,19 @@ class Figure:
         return f"{text} {self.range(entry)}"
 
     def range(self, entry: Entry) -> str:
-        """The interval as the terminal has it, with "–" for an end that is not known."""
+        """Return the interval as in the terminal, with "–" for an unknown end."""
         ends = self.interval(entry) or (None, None)
         low, high = (NONE if end is None else f"{self.scale * end:{self.form}}" for end in ends)
         return f"[{low}, {high}]"
 
 
 def known(figures: Sequence[Figure], entries: Sequence[Entry]) -> list[Figure]:
-    """Those that any of the entries has."""
+    """Return the figures that at least one of the entries has."""
     return [each for each in figures if any(each.text(entry) != NONE for entry in entries)]
 
 
 def _some(key: str, zero: bool = False) -> Callable[[Entry], bool]:
-    """Whether an entry has this figure; without `zero`, one that is not 0."""
+    """Return a test of whether an entry has this figure, other than 0 unless `zero`."""
     return lambda entry: entry.get(key) is not None and (zero or entry[key] != 0)
 
 
@@ -117,12 +117,14 @@ J50_BOUNDED = Figure("j50_bounded", "bounds", ".0f", words="directions where J50
 ETA_MEAN = Figure("eta_mean", "η mean", ".2f", words="J50 over the ankle limit, mean of all",
                   ends="eta_mean_ci95")  # fmt: skip
 ETA_WORST = Figure("eta_min", "η worst", ".2f", words="in the worst direction", csv="eta_worst")
-#: in units of what pushes are measured by, which whoever shows it names
-HALF_AT = Figure("fraction50", "J50", ".2f", "limit", "half of pushes of this size are recovered",
-                 ends="fraction50_ci95", bound="fraction50_bound")  # fmt: skip
+#: in units of the suite's limit; each table sets its own unit
+J50_SCALED = Figure(
+    "fraction50", "J50", ".2f", "limit", "half of the pushes of this size are recovered",
+    ends="fraction50_ci95", bound="fraction50_bound",
+)  # fmt: skip
 RECOVERED = Figure("recovered_rate", "recovered", ".0%", words="fraction of all trials",
                    ends="recovered_ci95")  # fmt: skip
-#: of a walk; the same key: whether the last strides are as near to the command as its own
+#: of a walk, under the same key: whether the last strides track the command as well as before
 AS_COMMANDED = replace(
     RECOVERED,
     name="as commanded again",
@@ -150,7 +152,7 @@ AT_REST = (
     _mm("com_drift_max", "CoM drift", "largest"),
     _mm("foot_drift_max", "feet drift", "largest"),
     Figure("unpushed_lean_max", "lean at the end", ".2f", "°"),
-    # of pushed robots these two say more of the pushes
+    # only without pushes, which otherwise dominate these two
     Figure("mean_power_median", "power", ".0f", "W", where=_some("com_drift_max", zero=True)),
     Figure("torque_variation_median", "chatter", ".2f", "1/s",
            where=_some("com_drift_max", zero=True)),
@@ -161,7 +163,7 @@ FAILURES_RECOVERED = Figure("solver_failures_recovered", "of them in recoveries"
 CHATTER = Figure("torque_variation_median", "chatter", ".1f", "1/s",
                  "change of torques over the motors' limits, of trials without a fall")  # fmt: skip
 ROOT = Figure("root_force_max", "root", ".0f", "N",
-              "largest force that a soft root took from nowhere")  # fmt: skip
+              "largest external force of a soft root")  # fmt: skip
 TICK = Figure("tick_us", "tick", ".0f", "µs", "time of one control tick")
 ROBUST = (
     Figure("step_share_1_mean", "of one-step limit", ".2f"),
@@ -185,7 +187,7 @@ OVER_SEEDS = (
 
 ENERGY = Figure("energy_median", "energy", ".0f", "J", "of trials without a fall")
 
-# of a controller at a level of realism
+# of a controller at a realism level
 J50_KEPT = Figure("j50_kept", "J50 kept", ".2f", words="over that of the first level",
                   ends="j50_kept_ci95")  # fmt: skip
 AT_LEVEL = (
@@ -213,12 +215,12 @@ AGAINST = (
         "lost",
         "lost",
         ".0f",
-        words="trials that the other one recovers (of walks: does not fall), and this not",
+        words="trials that only the other one recovers (of walks: does not fall)",
     ),
-    Figure("won", "won", ".0f", words="trials that this recovers, and the other one not"),
+    Figure("won", "won", ".0f", words="trials that only this one recovers"),
 )
 LOST_WON = Figure("only_a", "lost, won", ".0f", beside="only_b",
-                  words="of the trials that both played")  # fmt: skip
+                  words="of the trials common to both")  # fmt: skip
 P_VALUE = Figure("p_mcnemar", "McNemar p", ".2g", words="McNemar's exact test of lost against won")
 GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", ends="j50_gain_ci95")
 
@@ -226,7 +228,7 @@ GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", end
 AIMED = (
     J50,
     Figure("j90", "J90", ".1f", "N·s", ends="j90_ci95"),
-    HALF_AT,
+    J50_SCALED,
     Figure("ankle_limit", "ankle limit", ".1f", "N·s"),
     Figure("eta", "η", ".2f"),
     *(
@@ -234,8 +236,7 @@ AIMED = (
         for key, name in (("1", "1-step limit"), ("2", "2-step limit"), ("inf", "∞-step limit"))
         for figure in (
             Figure(f"step_limit_{key}", name, ".1f", "N·s", "of a pendulum that steps"),
-            Figure(f"step_share_{key}", "of it", ".2f", bound="j50_bound",
-                   words="fraction of that limit that J50 is"),
+            Figure(f"step_share_{key}", f"J50 / {name}", ".2f", bound="j50_bound"),
         )
     ),
 )  # fmt: skip
@@ -245,7 +246,7 @@ SWAY = (
     Figure("body_sway_mean", "body sway", ".3f", "rad", "mean over recovered standard pushes"),
     Figure("recovery_time_mean", "recovery time", ".2f", "s",
            "until the sway stays below 0.015 rad/s"),
-    Figure("recovery_time_trials", "of trials", ".0f", words="that came to rest by this measure"),
+    Figure("recovery_time_trials", "trials at rest", ".0f", words="by this measure"),
 )  # fmt: skip
 MARGINS = (
     Figure("force", "margin", ".0f", "N", "largest with < 30 % falls in 10 runs",
@@ -262,7 +263,7 @@ FALLS = (
            ends="falls_per_minute_ci95"),
     replace(NOT_FALLEN, words="fraction of the trials"),
     replace(AS_COMMANDED, name="as commanded", words="fraction of trials whose last strides are as "
-            "near to the command as its own before the push; unpushed, within 0.05 m/s and 5 °/s"),
+            "near to the command as those before the push; unpushed: within 0.05 m/s and 5 °/s"),
 )  # fmt: skip
 FOLLOWED = (
     Figure("speed_ahead", "ahead", ".3f", "m/s", "mean over the strides"),
@@ -270,77 +271,77 @@ FOLLOWED = (
     Figure("turn_rate", "turn", ".3f", "rad/s", "to the left, mean over the strides"),
     Figure("speed_error_rms", "RMS error", ".3f", "m/s",
            "of the strides' velocities from the command"),
-    Figure("turn_error_rms", "of the turn", ".3f", "rad/s", "root mean square over the strides"),
+    Figure("turn_error_rms", "turn RMS error", ".3f", "rad/s", "over the strides"),
     Figure("own_speed_error", "own error", ".3f", "m/s",
-           "largest of a stride before the push: the tracking error of the controller itself"),
-    Figure("last_speed_error", "last error", ".3f", "m/s", "of the last two strides"),
-    Figure("circle_error", "off the circle", ".3f", "m", "largest distance"),
+           "largest of a stride before the push: the controller's own tracking error"),
+    Figure("last_speed_error", "final error", ".3f", "m/s", "of the last two strides"),
+    Figure("circle_error", "circle error", ".3f", "m", "largest distance from the circle"),
     Figure("surfaces_passed", "surfaces passed", ".1f", words="of the terrain, mean"),
     Figure("edge_contacts", "edges touched", ".2f",
-           words="times that a foot came to touch one, mean",
-           where=lambda entry: entry.get("surfaces_passed") is not None),  # else there is none
+           words="new contacts of a foot with an edge, mean",
+           where=lambda entry: entry.get("surfaces_passed") is not None),  # else no edges
 )  # fmt: skip
 STEPS = (
-    Figure("steps_as_told_rate", "steps as told", ".0%", words="no fall, all within 10 %"),
-    Figure("step_error", "off by", ".1%", words="largest of the step parameters told"),
+    Figure("steps_as_told_rate", "steps as commanded", ".0%", words="no fall, all within 10 %"),
+    Figure("step_error", "step error", ".1%", words="largest of the commanded step parameters"),
     Figure("step_length", "step", ".3f", "m", "length, along the heading"),
     Figure("step_width", "width", ".3f", "m", "of a step, across the heading"),
     Figure("step_time", "time", ".3f", "s", "between touchdowns"),
-    Figure("swing_time", "in the air", ".3f", "s", "from lift-off to touchdown"),
+    Figure("swing_time", "swing", ".3f", "s", "from lift-off to touchdown"),
     Figure("step_clearance", "clearance", ".3f", "m", "of the sole's middle at its highest"),
-    _mm("foot_slide", "slide", "largest way of a sole that bears the robot alone"),
+    _mm("foot_slide", "slide", "largest displacement of a sole in single support"),
 )
 COSTS = (
     Figure("cost_of_transport", "cost of transport", ".2f", words="∫ Σ |τ q̇| dt / (m g d)"),
     Figure("positive_cost_of_transport", "of positive work", ".2f",
            words="∫ Σ max(τ q̇, 0) dt / (m g d)"),
     Figure("knee_mean", "stance knee", ".2f", "N·m/kg", "mean of |τ|/m"),
-    Figure("knee_peak", "at most", ".2f", "N·m/kg", "largest |τ|/m"),
+    Figure("knee_peak", "peak", ".2f", "N·m/kg", "largest |τ|/m"),
     Figure("yaw_momentum", "yaw momentum", ".2f", "N·m·s", "root mean square about the vertical"),
 )  # fmt: skip
 FELL = Figure("fallen_rate", "fell", ".1%", words="share of the trials; Wilson's interval",
               ends="fallen_ci95")  # fmt: skip
 PERFORMED = (
-    Figure("joint_rms", "joints", ".1f", "°", "root mean square of the joints' errors",
+    Figure("joint_rms", "joints", ".1f", "°", "root mean square of the joint errors",
            float(np.degrees(1.0))),
-    _mm("body_error", "bodies", "mean distance from where the motion has them"),
+    _mm("body_error", "bodies", "mean distance from the reference motion"),
     _mm("body_error_root", "from the root", "the same, relative to the root"),
     _mm("body_error_last", "last second", "the same in the last second"),
-    _mm("com_error", "CoM", "mean distance from where the motion has it"),
-    _mm("sole_slide", "slide", "how far a sole moved since it landed"),
-    Figure("motion_delay", "late", ".2f", "s", "the motion at the end, where it waits"),
-    _mm("swing_error", "swing", "root mean square of a sole's way in the air, with steps"),
-    _mm("placement_error", "placed", "largest, of a sole that lands"),
-    _mm("support_slide", "support", "largest way of a planted sole"),
-    Figure("interruptions", "caught", ".2f", words="how often steps of the planner took over"),
+    _mm("com_error", "CoM", "mean distance from the reference motion"),
+    _mm("sole_slide", "slide", "displacement of a sole since touchdown"),
+    Figure("motion_delay", "delay", ".2f", "s", "of the motion at the end, where it may wait"),
+    _mm("swing_error", "swing", "root mean square error of the swing foot, with steps"),
+    _mm("placement_error", "foothold", "largest error of a sole at touchdown"),
+    _mm("support_slide", "support", "largest displacement of a planted sole"),
+    Figure("interruptions", "recovery steps", ".2f", words="times that the planner took over"),
     Figure("steps_mean", "steps", ".1f", words="mean of the touchdowns"),
     Figure("mean_power", "power", ".0f", "W", "∫ Σ |τ q̇| dt over the time"),
 )  # fmt: skip
 IN_MOTION = (
     TRIED[0],
     Figure("recovered", "stayed up", ".0f"),
-    Figure("share50", "half fall at", ".2f", words="share of the J50 that pushes were chosen by",
+    Figure("share50", "J50 in motion", ".2f", "J50", "over the J50 by which pushes were chosen",
            ends="share50_ci95", bound="share50_bound"),
     Figure("over_standing", "over standing", ".2f", words="J50 in motion over J50 standing",
            ends="over_standing_ci95", bound="share50_bound"),
 )  # fmt: skip
 
-# of pushes that last, and of gusts
-HELD = (
+# of sustained pushes and gusts
+SUSTAINED = (
     TRIED[0],
-    Figure("never_fell_rate", "held", ".0%", words="trials without a fall",
+    Figure("never_fell_rate", "not fallen", ".0%", words="trials without a fall",
            ends="never_fell_ci95"),
-    Figure("f50", "F50", ".1f", "N", "largest force of a push that half of the trials hold",
+    Figure("f50", "F50", ".1f", "N", "peak force that half of the trials resist without a fall",
            ends="f50_ci95", bound="f50_bound"),
     Figure("f50_per_mass", "F50/m", ".2f", "N/kg", "the same over the robot's mass"),
     replace(RECOVERED, name="at rest again", words="fraction of all trials, at the end"),
 )  # fmt: skip
 GUSTS = (
     TRIED[0],
-    Figure("never_fell_rate", "never fell", ".0%", words="trials without a fall",
+    Figure("never_fell_rate", "not fallen", ".0%", words="trials without a fall",
            ends="never_fell_ci95"),
     Figure("survived_mean", "gusts survived", ".2f", words="mean over the trials",
            ends="survived_ci95", of="pushes"),
-    Figure("first_survived", "the first", ".0f", words="trials that survive the first gust"),
-    HELD[-1],
+    Figure("first_survived", "first survived", ".0f", words="trials that survive the first gust"),
+    SUSTAINED[-1],
 )  # fmt: skip

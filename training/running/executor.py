@@ -1,6 +1,6 @@
-"""Jobs are done by processes of this machine, by joblib, or by joblib on a Ray cluster.
+"""Back ends that run jobs: processes of this machine, joblib, or joblib on a Ray cluster.
 
-Whoever does them, a job's result is the same, so that back ends differ in speed alone.
+All back ends give the same results and differ only in speed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .stopping import uninterrupted
 Backend = Literal["local", "joblib", "ray"]
 BACKENDS: tuple[Backend, ...] = ("local", "joblib", "ray")
 DIED = "a worker process has died (out of memory?)"
-BLOCK = 8  # jobs per process that Ray is given at a time
+BLOCK = 8  # jobs per process that are submitted to Ray at a time
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
@@ -41,11 +41,11 @@ def check_backend(backend: str) -> None:
 
 
 class Executor:
-    """Does jobs on `workers` processes until closed; use as a context.
+    """Run jobs on `workers` processes until closed; use as a context.
 
-    None: all cores, of this machine or of the cluster; `workers` tells how many once it is open.
-    What a process that dies was at is done again, once. After an error or Ctrl-C the processes are
-    ended at once, whatever they are at.
+    With None, use all cores of this machine or of the cluster; once open, `workers` is their
+    number. The job of a process that dies is repeated once. After an error or Ctrl-C all
+    processes are ended at once.
     """
 
     def __init__(self, backend: str, workers: int | None):
@@ -82,11 +82,11 @@ class Executor:
     def each(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Yield each job with `function(job)`, in the order that they end in; both are pickled.
+        """Yield each job with `function(job)`, in order of completion; both are pickled.
 
-        What the user allows to run here may run there.
+        Workers inherit the plugins that the user allows.
 
-        Raises PoiseError when processes have died of a job twice, and what the function raises.
+        Raises PoiseError when two processes have died on one job, and whatever the function raises.
         """
         if not jobs:
             return iter(())
@@ -97,8 +97,10 @@ class Executor:
     def _with_joblib(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Yield jobs and results. After a death, whose job is not known, the rest is played again,
-        until nothing is done between two.
+        """Yield jobs and results.
+
+        joblib does not report which job a dead worker had, so all remaining jobs are repeated,
+        until two deaths follow without a finished job in between.
         """
         left, done = dict(enumerate(jobs)), True
         while left:
@@ -110,21 +112,20 @@ class Executor:
                 if not any(word in type(error).__name__ for word in ("Worker", "Actor")):
                     raise
                 if not done:
-                    raise PoiseError(f"{DIED}, twice at the same work; {ADVICE}") from None
-                tell(f"{DIED}: another one does its work again")
+                    raise PoiseError(f"{DIED}, twice on the same work; {ADVICE}") from None
+                tell(f"{DIED}: its work is repeated")
                 done = False
 
     def _round(
         self, function: Callable[[Job], Result], jobs: dict[int, Job]
     ) -> Iterator[tuple[int, Result]]:
-        """Numbers of jobs with results, as they are done."""
+        """Yield numbers of jobs with results, in order of completion."""
         import joblib
 
         ray = self.backend == "ray"
         call: Callable = joblib.delayed(do)
         tasks = [call(function, job, number, tuple(sys.path)) for number, job in jobs.items()]
-        # Ray's backend gives results only when all are there: so a few at a time, by one set of
-        # processes
+        # Ray's backend returns results only when all are complete, so it gets a few jobs at a time
         block = BLOCK * self.workers if ray else len(tasks)
         way = "list" if ray else "generator_unordered"
         with (
@@ -140,7 +141,7 @@ class Executor:
 def do(
     function: Callable[[Job], Result], job: Job, number: int, path: tuple[str, ...]
 ) -> tuple[int, Result]:
-    """Do a job where modules are found as in the main process; `path` is its `sys.path`."""
+    """Run a job with the module search path of the main process; `path` is its `sys.path`."""
     sys.path += [folder for folder in path if folder not in sys.path]
     for name in THREADS:
         os.environ.setdefault(name, "1")
@@ -148,7 +149,7 @@ def do(
 
 
 def _start_ray(workers: int) -> int:
-    """Join the cluster that RAY_ADDRESS names, else start one here; returns its cores."""
+    """Join the cluster at RAY_ADDRESS, else start a local one; return its number of cores."""
     import ray
     from ray.util.joblib import register_ray
 

@@ -11,13 +11,13 @@ import numpy as np
 
 SETTINGS, LOG, TRIALS, SUMMARY = "settings.yaml", "trials.jsonl", "trials.csv", "summary.json"
 PLOTS = ("polar_envelope.png", "fall_probability.png")
-CURVE = "learning_curve.png"  # where policies of a run are told apart by their steps
-REPORT = "report.html"  # by `poise report`; not of the result, but gone with it
+CURVE = "learning_curve.png"  # only for several checkpoints of a training run
+REPORT = "report.html"  # by `poise report`; removed together with the result
 FILES = (SUMMARY, SETTINGS, LOG, TRIALS, *PLOTS, CURVE)
 
 
 def csv_text(rows: Sequence[Mapping[str, object]], columns: Sequence[str]) -> str:
-    """Rows as CSV with a header."""
+    """Return rows as CSV with a header."""
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
@@ -26,7 +26,7 @@ def csv_text(rows: Sequence[Mapping[str, object]], columns: Sequence[str]) -> st
 
 
 def plain(value: object) -> Any:
-    """For JSON: plain lists and numbers, None for what is not finite."""
+    """Return a value as plain lists and numbers for JSON, None where a number is not finite."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return plain(dataclasses.asdict(value))
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""A folder that is written to: by one process at a time, and only anew or with --resume."""
+"""An output folder: one writer at a time, and either new or continued with --resume."""
 
 from __future__ import annotations
 
@@ -14,22 +14,24 @@ from pathlib import Path
 
 from poise.configs.errors import ConfigError, PoiseError
 
-HOLDER = ".poise.lock"  # who holds the lock: of a process that was killed it says nothing
-#: of the environment: the number of a run among several of one command
+HOLDER = ".poise.lock"  # names the process that holds the lock; meaningless after a kill
+#: environment variable: index of a run in a job array
 ARRAY = "SLURM_ARRAY_TASK_ID"
-#: what file systems of clusters say that do not lock a folder, or nothing at all
+#: errors of cluster file systems that cannot lock a folder, or lock nothing
 NO_LOCKS = (errno.EBADF, errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 class FolderLock(contextlib.AbstractContextManager):
-    """Holds a folder until `release`, or the end of the process; also as a context.
+    """Lock a folder until `release` or the end of the process; also a context.
 
-    The folder is made if missing, and an empty one that it has made goes again. The system keeps
-    the lock, so that one of a dead process blocks nobody. Files that a killed process has left
-    half-written go. Where a file system locks no folder, a file in it is locked; where it locks
-    nothing, a line says so.
+    The folder is created if missing, and removed again if it stays empty. The operating system
+    releases the lock of a dead process. Partial files of killed processes are removed. Where the
+    file system cannot lock a folder, a file in it is locked; where it has no locks at all, a
+    warning line is printed.
 
-    Raises PoiseError when another process holds it, which it names, or the folder cannot be made.
+    Raises:
+        PoiseError: another process, which is named, holds the lock, or the folder cannot be
+            created.
     """
 
     def __init__(self, path: Path):
@@ -47,7 +49,7 @@ class FolderLock(contextlib.AbstractContextManager):
             raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
         command = shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
         text = f"{os.getpid()}\n{command}\n{socket.gethostname()}\n"
-        with contextlib.suppress(OSError):  # a full disk: the run says so where it matters
+        with contextlib.suppress(OSError):  # an exhausted disk is reported by later writes
             (path / HOLDER).write_text(text, "utf-8", "replace")
         _remove_parts(path)
 
@@ -71,7 +73,7 @@ class FolderLock(contextlib.AbstractContextManager):
         self.release()
 
     def release(self) -> None:
-        """Let others write."""
+        """Release the lock."""
         if self._file < 0:
             return
         with contextlib.suppress(OSError):
@@ -88,28 +90,28 @@ class FolderLock(contextlib.AbstractContextManager):
 
 
 def check_resume(out: Path, resume: bool, there: bool, held: str, kind: str) -> None:
-    """Raise ConfigError unless `resume` says whether there is something to go on with.
+    """Raise ConfigError unless `resume` matches whether there is something to continue.
 
-    `held` and `kind` name that, such as "a training run" and "run".
+    `held` and `kind` name it, such as "a training run" and "run".
     """
     if there and not resume:
-        raise ConfigError(f"already holds {held}; go on with --resume or choose another folder",
+        raise ConfigError(f"already holds {held}; continue with --resume or choose another folder",
                           source=out, field="out")  # fmt: skip
     if resume and not there:
         raise ConfigError(f"holds no {kind} to resume", source=out, field="resume")
 
 
 def _of_array() -> str:
-    """What a run of a job array is to do that shares its folder with the others."""
+    """Return advice for a run of a job array that shares its folder with others."""
     index = os.environ.get(ARRAY)
     return "" if index is None else (
-        f"; this is run {index} of a job array: give each a folder and a seed of its own, such as "
+        f"; this is run {index} of a job array: give each run its own folder and seed, such as "
         f"--out DIR/${ARRAY} --seed ${ARRAY}"
     )  # fmt: skip
 
 
 def _holder(path: Path) -> str:
-    """The process that holds the lock, in words."""
+    """Describe the process that holds the lock."""
     try:
         process, command, host = (path / HOLDER).read_text("utf-8").splitlines()
     except (OSError, ValueError):
@@ -119,7 +121,7 @@ def _holder(path: Path) -> str:
 
 
 def _remove_parts(path: Path) -> None:
-    """Remove what `write_atomic` and `video.record` left unfinished when they were killed."""
+    """Remove partial files that killed calls of `write_atomic` and `video.record` left."""
     for part in path.glob(".*.part*"):
         found = re.fullmatch(r"\..*\.(\d+)\.part(\.mp4)?", part.name)
         if found and not _alive(int(found[1])):
@@ -132,6 +134,6 @@ def _alive(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # it is of another user
+    except (OSError, OverflowError):  # a process of another user
         return True
     return True

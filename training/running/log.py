@@ -1,4 +1,4 @@
-"""A file of finished trials, one JSON line each, that a kill or a full disk cannot spoil."""
+"""A file of finished trials, one JSON line each, that survives a kill or an exhausted disk."""
 
 import contextlib
 import errno
@@ -16,10 +16,12 @@ Key = TypeVar("Key")  # of a trial
 
 
 def read_log(path: Path) -> tuple[list[tuple[Any, Any]], int]:
-    """(key, value) of every line, and how many lines could not be read; a missing file is empty.
+    """Return (key, value) of every line, and the number of unreadable lines.
 
-    A kill cuts off the last line; lines that a broken disk spoils are left out alike.
-    Raises ConfigError for a file of more than 128 MiB.
+    A missing file counts as empty. A line cut off by a kill or corrupted by a disk is left out.
+
+    Raises:
+        ConfigError: a file of more than 128 MiB.
     """
     entries, damaged = [], 0
     for line in read_lines(path) if is_file(path) else []:
@@ -32,9 +34,9 @@ def read_log(path: Path) -> tuple[list[tuple[Any, Any]], int]:
 
 
 class TrialLog(Generic[Key]):
-    """Opens the file with the entries that it is to have, whole lines only, and appends to it.
+    """A log that is first rewritten with the given entries, then appended to in whole lines.
 
-    Raises PoiseError when the file cannot be written.
+    Raises PoiseError if the file cannot be written.
     """
 
     def __init__(self, path: Path, entries: Mapping[Key, object]):
@@ -46,7 +48,7 @@ class TrialLog(Generic[Key]):
             raise self._error(error) from None
 
     def append(self, key: Key, value: object) -> None:
-        """Write an entry to the disk, whole or not at all; raises PoiseError."""
+        """Write an entry to the disk, completely or not at all; raises PoiseError."""
         line, size = _line(key, value).encode(), os.stat(self.path).st_size
         try:
             if self._file.write(line) < len(line):
@@ -58,13 +60,13 @@ class TrialLog(Generic[Key]):
             raise self._error(error) from None
 
     def close(self) -> None:
-        """Stop; what was appended stays."""
+        """Close the file; appended entries stay."""
         self._file.close()
 
     def _error(self, error: OSError) -> PoiseError:
         return PoiseError(
             f"{self.path}: cannot be written ({error.strerror}); the finished trials are kept: "
-            "run the same command again to go on"
+            "run the same command again to continue"
         )
 
 

@@ -1,7 +1,7 @@
-"""Processes of this machine that do jobs, one at a time each.
+"""Worker processes of this machine, each of which runs one job at a time.
 
-A worker that dies, killed or out of memory, costs only what it was at: another one does that again,
-once. Who else works goes on undisturbed, and what is done stays done.
+If a worker dies, killed or out of memory, another worker repeats its job, once. Other workers and
+finished results are unaffected.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from poise.configs.errors import PoiseError, PoiseWarning
 from .stopping import uninterrupted
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-# A new process would search the current folder before the libraries; instead it is sent `sys.path`.
+# A new process would search the current folder before the libraries; it receives `sys.path`.
 FOR_CHILDREN = (*THREADS, "PYTHONSAFEPATH")
 OUT_OF_MEMORY = errno.ENOMEM  # exit code of a worker
-UNGUARDED = 97  # of one that would start workers itself while it imports the user's script
-PATIENCE = 5.0  # [s] for a worker to end by itself
-ADVICE = "what is finished is kept: run the same command again to go on, with fewer --workers"
+UNGUARDED = 97  # of a worker that would start workers while importing the user's script
+PATIENCE = 5.0  # [s] for a worker to exit
+ADVICE = "finished work is kept: run the same command again with fewer --workers to continue"
 GUARD = (
-    "processes import the script that starts them: put what it does under "
+    "worker processes import the script that starts them: put its code under "
     "`if __name__ == '__main__':`"
 )
 Job = TypeVar("Job")
@@ -43,16 +43,17 @@ Result = TypeVar("Result")
 
 
 def end_if_imported() -> None:
-    """End this process if it is one that is only importing the script that has started it.
+    """End this process if it is a worker that is importing the user's script.
 
-    It would start processes of its own, which multiprocessing refuses in thirty lines.
+    Otherwise the script would start workers itself, and multiprocessing would fail with a long
+    traceback.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         os._exit(UNGUARDED)
 
 
 class WorkerPool:
-    """Up to `count` processes, started when there are jobs; they stay for the next ones."""
+    """Up to `count` processes, started on demand and reused."""
 
     def __init__(self, count: int):
         self.count = count
@@ -61,18 +62,18 @@ class WorkerPool:
     def each(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Yield each job with `function(job)`, in the order that they end in; both are pickled.
+        """Yield each job with `function(job)`, in order of completion; both are pickled.
 
-        Raises PoiseError when two workers have died of a job, and what the function raises.
+        Raises PoiseError when two workers have died on one job, and whatever the function raises.
         """
         waiting = deque(Task(function, job) for job in jobs)
         for _ in range(len(waiting)):
             task, result = self._next(waiting)
-            self._hand_out(waiting)  # before the caller takes its time
+            self._hand_out(waiting)  # workers run while the caller handles the result
             yield task.job, result
 
     def end(self) -> None:
-        """Let the workers end by themselves, those that are at nothing."""
+        """Let idle workers exit, then kill the others."""
         for worker in self.workers:
             worker.connection.close()
         for worker in self.workers:
@@ -80,7 +81,7 @@ class WorkerPool:
         self.kill()
 
     def kill(self) -> None:
-        """End the workers at once, whatever they are at."""
+        """Kill all workers at once."""
         for worker in self.workers:
             worker.process.kill()
         for worker in self.workers:
@@ -89,7 +90,7 @@ class WorkerPool:
         self.workers.clear()
 
     def _next(self, waiting: deque[Task[Job, Result]]) -> tuple[Task[Job, Result], Result]:
-        """The next task that is done, with its result."""
+        """Return the next completed task with its result."""
         while True:
             self._hand_out(waiting)
             busy = {worker.connection: worker for worker in self.workers if worker.task}
@@ -107,9 +108,9 @@ class WorkerPool:
                 task.deaths += 1
                 if task.deaths > 1:
                     raise PoiseError(
-                        f"{death}, as did another at the same work; {ADVICE}"
+                        f"{death}, as did another on the same work; {ADVICE}"
                     ) from None
-                tell(f"{death}: another one does its work again")
+                tell(f"{death}: its work is repeated")
                 waiting.appendleft(task)
                 continue
             done, value, where = pickle.loads(answer)
@@ -118,7 +119,7 @@ class WorkerPool:
             return task, value
 
     def _hand_out(self, waiting: deque[Task]) -> None:
-        """Give tasks to the idle, and to new workers while there are fewer than `count`."""
+        """Assign tasks to idle workers, and to new ones up to `count`."""
         for worker in [worker for worker in self.workers if not worker.task]:
             if waiting:
                 worker.give(waiting.popleft())
@@ -130,7 +131,7 @@ class WorkerPool:
 
 @dataclass(eq=False)
 class Task(Generic[Job, Result]):
-    """A job, and how many workers have died of it."""
+    """A job, and the number of workers that have died on it."""
 
     function: Callable[[Job], Result]
     job: Job
@@ -138,7 +139,7 @@ class Task(Generic[Job, Result]):
 
 
 class Worker:
-    """A process, the way to it, and what it is at."""
+    """A process, its connection and its current task."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -146,19 +147,19 @@ class Worker:
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs,))
         self.process.start()
-        theirs.close()  # the worker alone holds it: its death is the end of the pipe
+        theirs.close()  # only the worker holds it: its death closes the pipe
 
     def give(self, task: Task) -> None:
-        """Let it do the task."""
+        """Start the task in the worker."""
         self.task = task
         content = pickle.dumps((task.function, task.job))
         try:
             self.connection.send_bytes(content)
         except OSError:
-            pass  # it is dead, which the answer tells
+            pass  # the worker is dead; reading its answer reports that
 
     def death(self) -> str:
-        """The way it has died, in words."""
+        """Return how the worker died, in words."""
         self.process.join(PATIENCE)
         self.process.kill()
         self.process.join()
@@ -173,22 +174,22 @@ class Worker:
 
 
 class WorkerTraceback(Exception):
-    """Tells where in the worker an error was raised."""
+    """The traceback of an error raised in a worker."""
 
 
 def tell(text: str) -> None:
-    """A line on the standard error; a progress bar moves on below it."""
+    """Print a line to the standard error, above any progress bar."""
     print(f"poise: {text}", file=sys.stderr, flush=True)
 
 
 def single_threaded() -> AbstractContextManager[None]:
-    """Processes started inside use one thread each for linear algebra; sums keep their order."""
+    """Limit linear algebra of processes started inside to one thread, so sums keep their order."""
     return environment(dict.fromkeys(FOR_CHILDREN, "1"))
 
 
 @contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Inside, the environment of this process has these variables."""
+    """Set environment variables of this process inside the context."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -202,9 +203,9 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def _serve(connection: multiprocessing.connection.Connection) -> None:
-    """Does tasks until the main process closes the pipe, or ends."""
+    """Run tasks until the main process closes the pipe or ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    warnings.simplefilter("ignore", PoiseWarning)  # the main process has said it
+    warnings.simplefilter("ignore", PoiseWarning)  # the main process has printed it
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(EOFError, OSError):  # the main process has closed the pipe, or died
         while True:
@@ -212,7 +213,7 @@ def _serve(connection: multiprocessing.connection.Connection) -> None:
 
 
 def _answer(content: bytes) -> bytes:
-    """The pickled result, or what was raised."""
+    """Return the pickled result or exception."""
     try:
         function, job = pickle.loads(content)
         return pickle.dumps((True, function(job), ""))
@@ -223,16 +224,16 @@ def _answer(content: bytes) -> bytes:
 
 
 def _portable(error: Exception) -> Exception:
-    """The error, or one of the same words if it cannot be pickled."""
+    """Return the error, or a RuntimeError with its text if it cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(error))
-    except Exception:  # a controller from outside may raise anything
+    except Exception:  # an external controller may raise anything
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error
 
 
 def _end_with_parent() -> None:
-    """A killed main process leaves no orphans."""
+    """End this process together with its parent, so that a kill leaves no orphans."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     multiprocessing.connection.wait([parent.sentinel])

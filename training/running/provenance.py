@@ -24,7 +24,7 @@ class Machine(TypedDict):
 
 
 class Circumstances(TypedDict):
-    """The origin of a result; `seconds` counts the last call alone."""
+    """The origin of a result; `seconds` is of the last call only."""
 
     command: str
     versions: dict[str, str]
@@ -36,7 +36,7 @@ class Circumstances(TypedDict):
 
 
 def circumstances(started: float, workers: int, backend: str) -> Circumstances:
-    """The origin of a result that this process makes; `started` is of `time.perf_counter`."""
+    """Return the origin of a result of this process; `started` is a `time.perf_counter` value."""
     return {
         "command": command(),
         "versions": versions(),
@@ -49,13 +49,13 @@ def circumstances(started: float, workers: int, backend: str) -> Circumstances:
 
 
 def command() -> str:
-    """The command line, without the folder of the program, which is this machine's."""
+    """Return the command line without the program's folder."""
     program = Path(sys.argv[0]).name
     return shlex.join(["poise" if program == "__main__.py" else program, *sys.argv[1:]])
 
 
 def versions(names: tuple[str, ...] = LIBRARIES) -> dict[str, str]:
-    """Versions of Python, Poise and the libraries."""
+    """Return the versions of Python, Poise and the libraries."""
     found = {"python": platform.python_version(), "poise": poise.__version__}
     for name in names:
         try:
@@ -66,7 +66,7 @@ def versions(names: tuple[str, ...] = LIBRARIES) -> dict[str, str]:
 
 
 def machine() -> Machine:
-    """This machine."""
+    """Return system, processor and cores of this machine."""
     return {
         "system": platform.platform(),
         "processor": _processor(),
@@ -75,14 +75,14 @@ def machine() -> Machine:
 
 
 def usable_cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores available to this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def commit() -> str | None:
-    """The commit of Poise's own checkout, with "+" where files differ from it; else None."""
+    """Return the commit of Poise's checkout, with "+" if files differ; None without a checkout."""
     root = Path(__file__).resolve().parents[2]
     top = _git(root, "rev-parse", "--show-toplevel")
     if top is None or Path(top).resolve() != root:

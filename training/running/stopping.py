@@ -1,9 +1,9 @@
-"""Ctrl-C and SIGTERM: a command unwinds, and where it cannot in half a second, it is ended.
+"""Ctrl-C and SIGTERM: a command unwinds within half a second, or its process is ended.
 
-Python runs its signal handlers between byte codes: a long native call, such as a compilation by
-LLVM, holds them up, and what they raise is lost inside a callback. The handler in C, however,
-writes to the wake-up descriptor at once, and a thread waits there. All files are written so that a
-kill at any moment spoils none, so ending the process loses no more than its last trial.
+Python runs its signal handlers between byte codes. A long native call, such as a compilation by
+LLVM, delays them, and an exception inside a callback is lost. The C handler, however, writes to
+the wake-up descriptor at once, and a thread waits there. All files are written atomically, so
+ending the process loses at most its last trial.
 """
 
 from __future__ import annotations
@@ -25,43 +25,43 @@ from typing import TypeAlias
 
 Handler: TypeAlias = Callable[[int, FrameType | None], object]  # of a signal
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-GRACE = 0.5  # [s] to unwind in
-ANEW = "the same command begins anew"
+GRACE = 0.5  # [s] to unwind
+RESTARTS = "the same command starts from the beginning"
 _END = b"\0"  # no signal has this number
-_kept: list[tuple[Path, str]] = []  # of the command that runs
-_asked: list[int] = []  # signals that it has been sent
+_kept: list[tuple[Path, str]] = []  # of the running command
+_asked: list[int] = []  # signals received
 _starting = threading.Lock()  # held while processes are started
 
 
 class Stopped(KeyboardInterrupt):
-    """A signal has asked the command to stop."""
+    """A signal requested the command to stop."""
 
 
 def keeps(path: Path, words: str) -> None:
-    """Have a stop say `words`, what is kept and how to go on, from now on, once `path` exists.
+    """Set the message of a stop from now on: what is kept, once `path` exists, and how to continue.
 
-    Of several, the first counts: that of the outermost caller.
+    The first call, that of the outermost caller, takes precedence.
     """
     _kept.append((path, words))
 
 
 def stop_message() -> str:
-    """The line for a command that was stopped."""
+    """Return the line printed after a stop."""
     words = [words for path, words in _kept if path.exists()]
-    return f"poise: stopped; {words[0] if words else ANEW}"
+    return f"poise: stopped; {words[0] if words else RESTARTS}"
 
 
 def stop_code() -> int | None:
-    """The exit code of a command that was asked to stop; None if it was not."""
+    """Return the exit code of a stopped command, or None."""
     return 128 + _asked[0] if _asked else None
 
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Inside, SIGINT and SIGTERM raise `Stopped`, and end the process if that does not end it.
+    """Make SIGINT and SIGTERM raise `Stopped` inside, and end the process if it does not unwind.
 
     A second signal ends the process at once. A signal that is ignored, as in a background job of a
-    shell, stays ignored. Outside the main thread, which alone has handlers, nothing changes.
+    shell, stays ignored. Outside the main thread, which alone can have handlers, nothing changes.
     """
     _kept.clear()
     _asked.clear()
@@ -81,15 +81,17 @@ def stoppable() -> Iterator[None]:
 
 
 def exit_at_once(code: int) -> None:
-    """Have a signal end this process with `code` from now on: its work is done and written."""
+    """Make a signal end this process with `code` from now on, when all work is written."""
     for number in SIGNALS:
         if signal.getsignal(number) not in (signal.SIG_IGN, None):
             signal.signal(number, lambda number, frame: os._exit(code))
 
 
 def ignore_stops() -> None:
-    """Signals have no effect any more: what is left is the interpreter's own end, in which Python
-    takes its handlers away, and the process would seem to have been killed."""
+    """Ignore signals during the interpreter's shutdown.
+
+    There Python removes its handlers, and a signal would look like a kill.
+    """
     for number in SIGNALS:
         if signal.getsignal(number) is not None:
             signal.signal(number, signal.SIG_IGN)
@@ -97,9 +99,9 @@ def ignore_stops() -> None:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Processes are started inside: a signal that comes takes effect when they are all known.
+    """Defer signals while processes are started inside, until all are registered.
 
-    They never see Ctrl-C: this process alone answers it.
+    The started processes do not receive Ctrl-C; this process alone handles it.
     """
     resource_tracker.ensure_running()  # its start would undo the block
     came: list[int] = []
@@ -115,7 +117,7 @@ def uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def _handled_by(handler: Handler) -> Iterator[dict[int, Handler]]:
-    """`handler` in the place of Python's handlers of the signals, if this is the main thread."""
+    """Replace Python's signal handlers by `handler` inside, if this is the main thread."""
     main = threading.current_thread() is threading.main_thread()
     found = {number: signal.getsignal(number) for number in SIGNALS if main}
     before: dict[int, Handler] = {number: old for number, old in found.items() if callable(old)}
@@ -136,8 +138,10 @@ def _raise(number: int, frame: FrameType | None) -> None:
 def _unraisable(
     otherwise: Callable[[sys.UnraisableHookArgs], object], lost: sys.UnraisableHookArgs
 ) -> None:
-    """A stop that is lost in a callback ends the process, which else would go on without what the
-    callback was to give: LLVM would run a kernel that has no code."""
+    """End the process on a stop that is lost in a callback.
+
+    Otherwise it would continue without the callback's result: LLVM would run a kernel without code.
+    """
     if isinstance(lost.exc_value, Stopped):
         end_now(_asked[0])
     otherwise(lost)
@@ -145,7 +149,7 @@ def _unraisable(
 
 @contextmanager
 def _watched() -> Iterator[None]:
-    """A thread hears of signals that the main thread has no time for."""
+    """Run a thread that receives signals while the main thread is busy."""
     read, write = os.pipe()
     os.set_blocking(write, False)
     before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
@@ -166,13 +170,13 @@ def _watch(read: int) -> None:
         if byte[0] in SIGNALS:
             second, _, _ = select.select([read], [], [], GRACE)
             if not second or os.read(read, 1) != _END:
-                _starting.acquire(timeout=GRACE)  # half-started processes would complain
+                _starting.acquire(timeout=GRACE)  # half-started processes would print errors
                 end_now(byte[0])
             return
 
 
 def end_now(number: int) -> None:
-    """End this process and all that it has started, whatever they are at."""
+    """End this process and all its children at once."""
     children = multiprocessing.active_children()
     for child in children:
         child.kill()

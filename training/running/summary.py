@@ -1,7 +1,7 @@
-"""The form of summary.json: what is written and what is read.
+"""The schema of summary.json.
 
 Impulses are N·s, lengths m, rates and gains fractions; an `Interval` is [low, high] of 95 %. null
-is "no such value"; a key that a suite does not measure is left out.
+means "no such value"; keys that a suite does not measure are left out.
 """
 
 # without `from __future__ import annotations`: TypedDict must see which keys are required
@@ -34,7 +34,7 @@ FORMAT = 2  # of a result's folder and of its summary
 class Sector(TypedDict):
     """Random pushes within 22.5° of a direction.
 
-    `fraction50` is the fraction of the limit at which half of them are recovered.
+    `fraction50` is their J50, as a fraction of the limit.
     """
 
     direction: float
@@ -73,7 +73,7 @@ class Direction(TypedDict, total=False):
 
 
 class EnvelopeFigures(TypedDict, total=False):
-    """J50 over the directions, of pushes of `push_duration` [s]; older results do not say it."""
+    """J50 over the directions, of pushes of `push_duration` [s], which older results lack."""
 
     push_duration: float
     j50_mean: float
@@ -92,7 +92,7 @@ class EnvelopeFigures(TypedDict, total=False):
 
 
 class Level(Rate):
-    """A level of a factor; lost and won are against the standard case."""
+    """A level of a factor; `lost` and `won` are relative to the standard case."""
 
     level: str
     standard: bool
@@ -132,10 +132,11 @@ class Eurobench(TypedDict):
 
 
 class RealismLevel(Rate, total=False):
-    """The parts of a suite at a level of realism.
+    """The parts of a suite at a realism level.
 
-    Rates are of random pushes, else of all; `stood` are the unpushed trials without a fall;
-    `j50_kept` is the J50 over that of the suite's own level, which comes first.
+    Rates are of random pushes, if there are any, else of all trials. `stood` counts the unpushed
+    trials without a fall. `j50_kept` is the J50 over that of the suite's own level, which comes
+    first.
     """
 
     level: Required[str]
@@ -150,7 +151,7 @@ class RealismLevel(Rate, total=False):
 
 
 class Fractions(TypedDict, total=False):
-    """The fraction of the limit at which half of the random pushes are recovered."""
+    """J50 of the random pushes, as a fraction of the limit."""
 
     fraction_of: str
     fraction50: float
@@ -160,17 +161,20 @@ class Fractions(TypedDict, total=False):
 
 
 class Loss(TypedDict):
-    """How many of the lost trials have a cause, see `training/benchmarking/diagnosis`."""
+    """The number of trials lost by a cause, see `training/benchmarking/diagnosis`."""
 
     cause: str
     trials: int
 
 
 class Entry(Counts, EnvelopeFigures, Fractions, total=False):
-    """A controller. The counts are of the part that is rated, else of all trials, of pushed walks
-    of those that all controllers meet. Of all are `played`, `errors`, in which it raised, and
-    `losses`, the most frequent cause first. J50, the ranking, pairs and losses go by the
-    `criterion`; results of before it was written go by "recovered"."""
+    """A controller.
+
+    The counts are of the rated part, else of all trials; of pushed walks, of those common to all
+    controllers. `played` counts all trials, `errors` those in which the controller raised.
+    `losses` lists the causes, the most frequent first. J50, ranking, pairs and losses use the
+    `criterion`; older results, which lack it, use "recovered".
+    """
 
     played: Required[int]
     errors: Required[int]
@@ -192,7 +196,7 @@ class Entry(Counts, EnvelopeFigures, Fractions, total=False):
 
 
 class Paired(TypedDict, total=False):
-    """Trials that both met, alike in all."""
+    """Counts of the identical trials of both controllers."""
 
     both: int
     only_a: int
@@ -212,7 +216,7 @@ class DirectionGain(TypedDict):
 
 
 class Pair(Paired, total=False):
-    """Controller b against a on the rated trials, and on all that both met."""
+    """Controller b against a on the rated trials, and on all common trials."""
 
     a: Required[str]
     b: Required[str]
@@ -224,7 +228,7 @@ class Pair(Paired, total=False):
 
 
 class SeedGroup(TypedDict, total=False):
-    """Runs of one configuration that differ in the seed alone, and their figures."""
+    """Figures of runs of one configuration that differ only in the seed."""
 
     name: Required[str]
     members: Required[list[str]]
@@ -241,8 +245,8 @@ Curves = TypedDict(
 
 
 class StepCurves(TypedDict):
-    """The impulses that 1, 2 and any number of steps can stop, of controllers with the same
-    limits of a step."""
+    """The impulses that 1, 2 and any number of steps can stop, of controllers with equal step
+    limits."""
 
     controllers: list[str]
     steps: dict[str, float]
@@ -261,8 +265,8 @@ class RobotFigures(TypedDict):
 
 
 class Summary(Circumstances):
-    """summary.json; `realism` is the level of a suite where that is not ideal, `physics` the engine
-    where that is not MuJoCo."""
+    """summary.json; `realism` is the suite's level unless ideal, `physics` the engine unless
+    MuJoCo."""
 
     realism: NotRequired[str]
     physics: NotRequired[str]
@@ -286,7 +290,7 @@ def check_format(found: object, path: Path) -> None:
         return
     other = "an older Poise" if found in (None, 1) else f"format {shown(found)}"
     raise ConfigError(
-        f"is of {other}, this one reads format {FORMAT}: play it again in another folder, "
+        f"is of {other}, this one reads format {FORMAT}: run it again in another folder, "
         "or with --overwrite",
         source=path,
         field="format",

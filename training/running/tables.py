@@ -1,4 +1,4 @@
-"""Tables in the terminal: what each row is of to the left, figures to the right."""
+"""Tables in the terminal: names to the left, figures to the right."""
 
 from collections.abc import Iterable, Sequence
 
@@ -11,7 +11,7 @@ from .columns import Entry, Figure
 def text_table(
     title: str, texts: Sequence[str], numbers: Sequence[str], rows: Iterable[Sequence[str]]
 ) -> Table:
-    """Rows under headings of texts and then of numbers; what has no room is folded, not cut."""
+    """Return a table of text columns, then number columns; long cells are folded, not cut."""
     table = Table(title=escape(title) or None, title_justify="left")
     for heading in texts:
         table.add_column(escape(heading), overflow="fold")
@@ -28,14 +28,14 @@ def figure_table(
     figures: Sequence[Figure],
     rows: Iterable[tuple[Sequence[str], Entry]],
 ) -> Table:
-    """Figures of entries; `names` are headings of what each row says first of whose they are."""
-    headings = [each.heading.replace(" [", "\n[") for each in figures]  # so more have room
+    """Return a table of the figures of entries; `names` are the headings of the row labels."""
+    headings = [each.heading.replace(" [", "\n[") for each in figures]  # narrower columns
     cells = ([*own, *(each.text(entry) for each in figures)] for own, entry in rows)
     return text_table(title, names, headings, cells)
 
 
 def fact_table(title: str, facts: Iterable[tuple[str, str]]) -> Table:
-    """A name and a value a row, without headings."""
+    """Return a table with a name and a value in each row, without headings."""
     table = Table(title=escape(title), title_justify="left", show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")

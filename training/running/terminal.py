@@ -1,4 +1,4 @@
-"""The terminal, and what it shows while an evaluation runs."""
+"""The terminal: console, progress and widths of tables."""
 
 import codecs
 import sys
@@ -24,19 +24,19 @@ from rich.table import Column
 from poise.configs.errors import PoiseWarning
 from poise.configs.texts import printable
 
-#: what a terminal prints whose encoding lacks the sign; "?" for any other
+#: replacements in a terminal whose encoding lacks the character; "?" for any other
 PLAIN = {"°": "deg", "·": "*", "×": "x", "≤": "<=", "≥": ">=", "–": "-", "−": "-", "…": "...",
          "→": "->", "±": "+-", "²": "2", "³": "3", "⁻": "-", "Δ": "d"}  # fmt: skip
-WIDTH = 120  # of tables that no terminal shows
-BESIDE = 3  # characters of a table's column besides its text
-SHORTEST, LONGEST = 10.0, 300.0  # [s] between lines of progress, where no terminal shows a bar
-GROWTH = 0.1  # the time between lines, over the time that has passed
+WIDTH = 120  # of tables outside a terminal
+PADDING = 3  # characters of a table's column in addition to its text
+SHORTEST, LONGEST = 10.0, 300.0  # [s] between progress lines outside a terminal
+GROWTH = 0.1  # time between lines over elapsed time
 
 
 def speak_plainly() -> None:
-    """Let no encoding of a terminal, or of a path, end a command: what it lacks is written out.
+    """Replace characters that a terminal's encoding lacks, instead of ending the command.
 
-    What is read otherwise than it is written, a `PoiseWarning`, is one line like an error.
+    Print each `PoiseWarning` as one line, like an error.
     """
     codecs.register_error("poise.plain", _plain)
     for stream in (sys.stdout, sys.stderr):
@@ -61,35 +61,35 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
 
 
 class Terminal(Console):
-    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1.
+    """A console that leaves a broken pipe to `cli.main`; Rich would exit with 1.
 
-    Texts that it is given hold no commands to the terminal, whoever has written them.
+    Control characters in texts are made harmless.
     """
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """As of `Console`."""
+        """See `Console`."""
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else printable(text), style, control)
 
     def on_broken_pipe(self) -> None:
-        raise  # what Rich has just caught
+        raise  # the error that Rich has just caught
 
 
 def terminal(stderr: bool = False) -> Console:
-    """The console that a command prints to; the other stream where a result is to be piped."""
-    console = Terminal(emoji=False, stderr=stderr)  # a controller may be called mine.py:B
+    """Return the console of a command, on the standard error where a result is piped."""
+    console = Terminal(emoji=False, stderr=stderr)  # mine.py:B: names a controller
     return console if console.is_terminal else Terminal(width=WIDTH, emoji=False, stderr=stderr)
 
 
 class ProgressLines(Progress):
-    """A bar in a terminal; elsewhere plain lines, the first at once, then ever more seldom."""
+    """A bar in a terminal, elsewhere plain lines at growing intervals, the first at once."""
 
     _started = _due = -1.0  # [s], monotonic
 
     def update(self, task_id: TaskID, **changes: Any) -> None:
-        """As of `Progress`."""
+        """See `Progress`."""
         super().update(task_id, **changes)
         if self.disable or self.console.is_terminal:
             return
@@ -106,20 +106,20 @@ class ProgressLines(Progress):
 
 
 def progress_bar(console: Console) -> Progress:
-    """A bar, or lines, with trials, the time left and recovery rates (its field `rates`)."""
+    """Return a bar, or lines, with trials, time left and recovery rates (field `rates`)."""
     return _bar(
         "trials", MofNCompleteColumn(), "not fallen, recovered: {task.fields[rates]}", console
     )
 
 
 def steps_bar(label: str, console: Console | None = None) -> ProgressLines:
-    """A bar, or lines, with steps of a training, the time left and rates (its field `rate`)."""
+    """Return a bar, or lines, with training steps, time left and rates (field `rate`)."""
     steps = TextColumn("{task.completed:,.0f}/{task.total:,.0f}")
     return _bar(label, steps, "{task.fields[rate]}", console)
 
 
 def _bar(label: str, count: ProgressColumn, rates: str, console: Console | None) -> ProgressLines:
-    """What is longest stands last, in what room is left: it is cut, the time is not."""
+    """Return a progress display; the longest column is last, where it may be cut."""
     console = console or Console()
     width = 40 if console.width >= WIDTH else 10
     last = TextColumn(rates, markup=False, table_column=Column(ratio=1, no_wrap=True))
@@ -128,27 +128,27 @@ def _bar(label: str, count: ProgressColumn, rates: str, console: Console | None)
 
 
 def print_paths(paths: Sequence[Path], console: Console) -> None:
-    """Print one path a line, whole, as it is to be copied."""
+    """Print one path per line, unwrapped, ready to copy."""
     for path in paths:
         console.print(str(path), markup=False, highlight=False, soft_wrap=True)
 
 
 def in_parts(cells: Mapping[str, Sequence[str]], room: int) -> list[dict[str, int]]:
-    """Headings and the widths of their columns, in parts as wide as `room`.
+    """Return headings and widths of their columns, in parts as wide as `room`.
 
-    A column has room for its longest word, and for whole texts where the part leaves it.
+    A column fits its longest word, and whole texts where room is left.
     """
     parts: list[dict[str, int]] = [{}]
     left = room
     for heading, texts in cells.items():
         word = max(len(word) for text in (heading, *texts) for word in text.split())
-        if parts[-1] and word + BESIDE > left:
+        if parts[-1] and word + PADDING > left:
             parts.append({})
             left = room
         parts[-1][heading] = word
-        left -= word + BESIDE
+        left -= word + PADDING
     for part in parts:
-        left = room - sum(part.values()) - BESIDE * len(part)
+        left = room - sum(part.values()) - PADDING * len(part)
         for heading in part:
             more = min(max(map(len, (heading, *cells[heading]))) - part[heading], left)
             part[heading] += max(more, 0)

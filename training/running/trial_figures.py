@@ -1,4 +1,4 @@
-"""What the trials of a controller tell in summary.json: counts, and means of walks and motions.
+"""Figures of a controller's trials in summary.json: counts, and means of walks and motions.
 
 Impulses are N·s, lengths m, rates fractions; an `Interval` is [low, high] of 95 %.
 """
@@ -11,17 +11,16 @@ Interval = tuple[Number, Number]
 Bound = Literal["lower", "upper"] | None  # where a fit is only a bound
 
 
-#: what J50, rankings and pairs of a controller count: of walks that it has not fallen, of all else
-#: that it has recovered
+#: what counts as success in J50, rankings and pairs: of walks no fall, otherwise recovery
 Criterion = Literal["not fallen", "recovered"]
 NOT_FALLEN: Criterion = "not fallen"
 RECOVERED: Criterion = "recovered"
 
 
 class Rate(TypedDict):
-    """The number of recovered trials, and of those without a fall, and their rates.
+    """Numbers and rates of recovered trials and of trials without a fall.
 
-    Those without a fall or an error are not in older results of all parts.
+    Older results lack the trials without a fall or an error of some parts.
     """
 
     trials: int
@@ -34,7 +33,7 @@ class Rate(TypedDict):
 
 
 class Rising(TypedDict, total=False):
-    """Robots that were down, by a fall or from the start, and how many were up again."""
+    """Robots that were down, after a fall or from the start, and the share that got up again."""
 
     downs: int
     up_again_rate: float
@@ -43,7 +42,7 @@ class Rising(TypedDict, total=False):
 
 
 class Counts(Rate, Rising, total=False):
-    """Counts of how trials ended, and medians of what was recorded."""
+    """Counts of outcomes, and medians of recorded figures."""
 
     recovered_with_step: int
     recovered_in_place: int
@@ -99,15 +98,15 @@ class WalkMeans(TypedDict, total=False):
     surfaces_passed: Number
 
 
-class StepsAsTold(TypedDict, total=False):
-    """Of commands with step parameters: the rate of walks that do not fall and whose steps are
-    within 10 % of each."""
+class StepsAsCommanded(TypedDict, total=False):
+    """The rate of walks without a fall whose steps are within 10 % of each commanded step
+    parameter."""
 
     steps_as_told_rate: float
 
 
-class WalkLevel(Rate, StepsAsTold, WalkMeans, total=False):
-    """Trials that walk by one command, one course, or kicked alike."""
+class WalkLevel(Rate, StepsAsCommanded, WalkMeans, total=False):
+    """Walking trials with one command, one course or one kind of kick."""
 
     part: str
     level: str
@@ -117,7 +116,7 @@ class WalkLevel(Rate, StepsAsTold, WalkMeans, total=False):
 
 
 class MotionMeans(TypedDict, total=False):
-    """Means over the trials that did not fall, see `Outcome`."""
+    """Means over the trials without a fall, see `Outcome`."""
 
     joint_rms: Number
     body_error: Number
@@ -134,7 +133,7 @@ class MotionMeans(TypedDict, total=False):
 
 
 class MotionLevel(MotionMeans):
-    """A motion pushed by a share of J50; `motion` is null for all together."""
+    """A motion, pushed by a share of J50; `motion` is null for all motions together."""
 
     motion: str | None
     share: float
@@ -149,8 +148,8 @@ class MotionLevel(MotionMeans):
 class InMotion(TypedDict):
     """J50 in a motion, as a share of the J50 by which its pushes were chosen.
 
-    `over_standing` is that over the same of standing. `motion` is null for the mean over all
-    motions, "standing" where it only stands; null where nothing was measured standing.
+    `over_standing` is its ratio to the same figure of standing, null where standing was not
+    measured. `motion` is null for the mean over all motions, "standing" for standing alone.
     """
 
     motion: str | None
@@ -164,8 +163,7 @@ class InMotion(TypedDict):
 
 
 class PhaseJ50(TypedDict):
-    """Pushes that begin in an eighth of a stride; `phase` is its middle, 0 where the left foot
-    lands."""
+    """Pushes that begin in one eighth of a stride; `phase` is its middle, 0 at left touchdown."""
 
     phase: float
     trials: int
@@ -183,8 +181,10 @@ class ScenarioFigures(Counts):
 
 
 class SustainedFigures(Counts):
-    """Pushes of seconds, of all profiles or of one. F50 [N] is the largest force of a push that
-    half of the trials hold without a fall."""
+    """Sustained pushes, of all profiles or of one.
+
+    F50 [N] is the peak force that half of the trials resist without a fall.
+    """
 
     profile: str
     f50: float
@@ -194,8 +194,8 @@ class SustainedFigures(Counts):
 
 
 class GustFigures(Counts):
-    """Trials of `pushes` gusts at most: the mean number that is survived, and the trials that
-    survive the first one."""
+    """Trials of up to `pushes` gusts: the mean number survived, and the trials that survive the
+    first gust."""
 
     pushes: int
     survived_mean: float

@@ -81,7 +81,7 @@ def test_it_goes_on_where_it_was_stopped(
         run(tmp_path / "demo")
     played.stop_after = None
     lines = run(tmp_path / "demo")
-    assert "going on after 7 finished trials" in lines
+    assert "continuing after 7 finished trials" in lines
     assert lines[-1] == "no video: no OpenGL"
     count = played.played
     run(tmp_path / "demo")

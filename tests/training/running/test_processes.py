@@ -59,7 +59,7 @@ def test_what_a_dead_worker_was_at_is_done_by_another(
         again = {process for _, (_, process) in executor.each(work, [("plain", 1)])}
         assert again <= {process for _, (_, process) in done}  # they stay for the next jobs
     told = capsys.readouterr().err.splitlines()
-    assert len(told) == 2 and all("another one does its work again" in line for line in told)
+    assert len(told) == 2 and all("its work is repeated" in line for line in told)
     assert any("SIGKILL" in line for line in told) and any(
         "out of memory:" in line for line in told
     )
@@ -101,9 +101,9 @@ def test_joblib_does_the_work_of_the_dead_again(
     with Executor("joblib", 2) as executor:
         jobs = [("die once", tmp_path / "die"), *(("plain", k) for k in range(4))]
         assert len(list(executor.each(work, jobs))) == 5
-    assert capsys.readouterr().err.count("another one does its work again") == 1
+    assert capsys.readouterr().err.count("its work is repeated") == 1
     with (
-        pytest.raises(PoiseError, match="twice at the same work"),
+        pytest.raises(PoiseError, match="twice on the same work"),
         Executor("joblib", 2) as executor,
     ):
         list(executor.each(work, [("die", tmp_path / "die2")]))
@@ -130,4 +130,4 @@ def test_a_script_without_a_guard_is_told_of_it(call: str, tmp_path: Path) -> No
         [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert result.returncode == 1 and result.stderr.count("Traceback") == 1
-    assert "put what it does under `if __name__ == '__main__':`" in result.stderr.splitlines()[-1]
+    assert "put its code under `if __name__ == '__main__':`" in result.stderr.splitlines()[-1]

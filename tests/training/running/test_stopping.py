@@ -44,7 +44,7 @@ def test_a_process_that_cannot_listen_is_ended(number: signal.Signals) -> None:
     process.send_signal(number)
     _, told = process.communicate(timeout=LATE)
     assert process.returncode == 128 + number
-    assert told == "poise: stopped; the same command begins anew\n"
+    assert told == "poise: stopped; the same command starts from the beginning\n"
     assert not kill(child, 0)
 
 
@@ -113,7 +113,7 @@ def test_an_error_that_a_library_makes_of_a_stop_is_a_stop(
 
     monkeypatch.setattr(entry, "_run", imports)
     assert main(["list"]) == 143
-    assert capsys.readouterr().err == "poise: stopped; the same command begins anew\n"
+    assert capsys.readouterr().err == "poise: stopped; the same command starts from the beginning\n"
     monkeypatch.setattr(entry, "_run", lambda _: 0)
     assert main(["list"]) == 0 and stop_code() is None
 
@@ -168,7 +168,7 @@ with stoppable(), uninterrupted():
 @pytest.mark.parametrize(
     ("code", "exit_code", "out", "told"),
     [
-        (IMPORTING, None, "", "poise: stopped; the same command begins anew\n"),
+        (IMPORTING, None, "", "poise: stopped; the same command starts from the beginning\n"),
         (ENDING, 0, "\nrobots ", ""),
         (LAST, 0, "\nrobots ", ""),
         (STARTING, None, "started\n", None),
@@ -215,4 +215,4 @@ def test_a_stop_that_a_callback_loses_ends_the_process(number: signal.Signals) -
     )
     assert done.returncode == 128 + number and done.stdout == "still here\n"
     assert "ValueError: told" in done.stderr and "Stopped" not in done.stderr
-    assert done.stderr.endswith("poise: stopped; the same command begins anew\n")
+    assert done.stderr.endswith("poise: stopped; the same command starts from the beginning\n")

@@ -1,1 +1,1 @@
-"""Why a trial was lost: what is recorded of it, what is found in that, and the words for it."""
+"""Why a trial was lost: the record of a trial, its diagnosis, and the diagnosis in words."""

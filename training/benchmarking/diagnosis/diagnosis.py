@@ -14,15 +14,15 @@ from poise.envs.robots.robot import Robot
 
 from .record import Course
 
-FULL = 0.999  # of a motor's limit
-FULL_STEPS = 2  # policy steps in a row for which a motor must be full to count
+SATURATED = 0.999  # of a motor's limit
+SATURATED_STEPS = 2  # consecutive policy steps at the limit from which a motor counts
 SLIPPED = 0.03  # [m] that a sole moves while it stands
-MISSED = 0.05  # [m] from where a foot lands to where it was to land
+MISSED = 0.05  # [m] from touchdown to the planned foothold
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Why a trial was lost; times in s after the reset, None where there is no such thing."""
+    """Why a trial was lost; times in s after the reset, None where it does not apply."""
 
     #: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far), "contact"
     #: (more than the feet on the ground), "diverged" (numbers too large), "not quiet" (on its feet,
@@ -43,7 +43,7 @@ class Diagnosis:
     foothold_time: float | None = None  #: when
     foothold_error: float | None = None  #: how far [m]
     failures_from: float | None = None  #: when the controller's solver first failed
-    #: what sensors or motors did where a suite's conditions say that they are not perfect; in words
+    #: effects of imperfect sensors or motors under a suite's conditions, in words
     hardware: str | None = None
 
 
@@ -51,7 +51,7 @@ COLUMNS = tuple(Diagnosis.__dataclass_fields__)
 
 
 def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagnosis:
-    """Why the trial that has just ended in `env` was lost.
+    """Return why the trial that has just ended in `env` was lost.
 
     Args:
         env: as it is after the trial.
@@ -62,7 +62,7 @@ def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagno
     failed = np.flatnonzero(course.failures > 0)
     return replace(
         _fall(env, loss) if env.fallen else Diagnosis(loss),
-        **_full(env, course, start),
+        **_saturated(env, course, start),
         **_capture(course),
         **_foothold(course, start),
         failures_from=_time(course, failed[0]) if len(failed) else None,
@@ -70,7 +70,7 @@ def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagno
 
 
 def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
-    """The criterion of `has_fallen` that is met, in the order in which it asks."""
+    """Return the first criterion of `has_fallen` that is met, in its order."""
     s, arrays = env.simulation.state_arrays, env.simulation.arrays
     if has_diverged(env.simulation.views):
         return Diagnosis("diverged")
@@ -84,7 +84,7 @@ def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
 
 
 def touching_body(env: BalanceEnv) -> str | None:
-    """The first body that is no foot and touches the ground."""
+    """Return the first body other than a foot that touches the ground."""
     model, data = env.model, env.data
     feet = {sole.body_id for sole in env.robot.soles}
     for contact in data.contact[: data.ncon]:
@@ -95,14 +95,14 @@ def touching_body(env: BalanceEnv) -> str | None:
     return None
 
 
-def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
-    """The motor that was first full, from when and for how long."""
-    full = (course.load > FULL) & (course.time > start)[:, None] & bearing(env.robot)
+def _saturated(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
+    """Return the first saturated motor, from when and for how long."""
+    full = (course.load > SATURATED) & (course.time > start)[:, None] & bearing(env.robot)
     lasting = [
         (first, last, motor)
         for motor in range(full.shape[1])
         for first, last in runs_of(full[:, motor]).tolist()
-        if last - first >= FULL_STEPS
+        if last - first >= SATURATED_STEPS
     ]
     if not lasting:
         return {}
@@ -153,7 +153,7 @@ def distance_outside(polygon: np.ndarray, point: np.ndarray) -> float:
 
 
 def _foothold(course: Course, start: float) -> dict[str, Any]:
-    """The first sole after the first push that slipped, or that landed where it should not."""
+    """Return the first slip or missed foothold after the first push."""
     for row in range(1, len(course.time)):
         if course.time[row] <= start:
             continue

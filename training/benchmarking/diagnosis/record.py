@@ -1,4 +1,4 @@
-"""What is kept of a trial at every policy step, so that its loss can be explained."""
+"""The record of a trial at every policy step, from which its loss is explained."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ from poise.baselines.walking.simbicon import Simbicon
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.episode import FAILURES
 
-UNSEEN = (PolicyFile, Simbicon)  #: which step without a plan that can be seen
+UNSEEN = (PolicyFile, Simbicon)  #: they step without a readable plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +32,10 @@ class Course:
 
 
 def swing_of(env: BalanceEnv) -> int | None:
-    """The foot that swings by the plan of the controller in an environment, −1 where none does.
+    """Return the swing foot in the plan of an environment's controller, −1 without one.
 
-    None where no plan can be seen: of torques, of networks, of classes from outside, of a policy
-    whose servos take over. A controller of this package that plans no steps never swings a foot.
+    None where no plan is readable: torque policies, networks, external classes, policies whose
+    servos take over. For controllers of this package that plan no steps it is always −1.
     """
     if not isinstance(env, ResidualBalanceEnv) or isinstance(env, ResidualWholeEnv):
         return None
@@ -47,9 +47,9 @@ def swing_of(env: BalanceEnv) -> int | None:
 
 
 class CourseRecord:
-    """Keeps the course of a trial; hand it to `run_trial`, or call it after every step.
+    """Record the course of a trial; pass it to `run_trial`, or call it after every step.
 
-    A call copies some sixty numbers: microseconds, beside a policy step of a millisecond.
+    A call takes microseconds, a policy step about a millisecond.
     """
 
     def __init__(self) -> None:
@@ -60,7 +60,7 @@ class CourseRecord:
         s = env.simulation.state_arrays
         if not self._rows:
             inner = env.controller if isinstance(env, ResidualBalanceEnv) else None
-            inner = getattr(inner, "unwrapped", inner)  # one from outside may be a bare object
+            inner = getattr(inner, "unwrapped", inner)  # an external one may be a plain object
             self._steps = inner if isinstance(inner, SteppingController) else None
             self._limit = np.array(env.robot.torque_limit)
         foot, foothold = -1, (np.nan, np.nan)
@@ -77,7 +77,7 @@ class CourseRecord:
         })  # fmt: skip
 
     def course(self) -> Course:
-        """What was kept, as arrays."""
+        """Return the record as arrays."""
         columns = {name: [row[name] for row in self._rows] for name in Course.__dataclass_fields__}
         supports = columns.pop("supports")
         arrays = {name: np.array(column) for name, column in columns.items()}

@@ -22,7 +22,7 @@ LOSSES = {
     "error": "the controller raised an error",
 }
 NUMBERS = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
-#: what a diagnosis tells together with its size
+#: column of a cause → column of its size
 SIZES = {"full_from": "full_time", "foothold_time": "foothold_error",
          "capture_left": "capture_outside"}  # fmt: skip
 DIRECTIONS = ("forward", "forward left", "left", "backward left", "backward", "backward right",
@@ -31,7 +31,7 @@ SIDE = re.compile(r"(^|_)(left|right|l|r)(?=_|$)")
 
 
 def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
-    """The diagnosis in a line of trials.csv; empty where older results have none.
+    """Return the diagnosis in a line of trials.csv; empty where older results have none.
 
     Raises ValueError for a number that is none, and for a cause without its time or size.
     """
@@ -45,35 +45,35 @@ def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
 
 
 def why(d: Diagnosis, fall_time: float | None = None) -> str:
-    """What is known of a lost trial, in the order of time; empty of one that was recovered."""
+    """Return the causes of a lost trial in order of time; empty for a recovered one."""
     if d.loss is None:
         return ""
     end = LOSSES.get(d.loss, d.loss).replace("{body}", d.loss_body or "a body")
     if fall_time is not None and d.loss not in ("not quiet", "off command"):
         end += f" at {fall_time:.2f} s"
-    told: list[tuple[float, str]] = []
+    causes: list[tuple[float, str]] = []
     if d.full_motor is not None and d.full_from is not None:
-        told.append((d.full_from, f"{d.full_motor} at its limit from {d.full_from:.2f} s, for "
+        causes.append((d.full_from, f"{d.full_motor} at its limit from {d.full_from:.2f} s, for "
                                   f"{d.full_time:.2f} s"))  # fmt: skip
     if d.failures_from is not None:
         then = ", when it was falling already" if _fell_before(d) else ""
-        told.append(
+        causes.append(
             (d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on{then}")
         )
     if d.foothold is not None and d.foothold_time is not None:
-        told.append((d.foothold_time, f"foothold {d.foothold} by {d.foothold_error:.2f} m at "
+        causes.append((d.foothold_time, f"foothold {d.foothold} by {d.foothold_error:.2f} m at "
                                       f"{d.foothold_time:.2f} s"))  # fmt: skip
     if d.capture_left is not None:
-        told.append((d.capture_left, "capture point outside of the support for good from "
+        causes.append((d.capture_left, "capture point outside of the support for good from "
                      f"{d.capture_left:.2f} s, by {d.capture_outside:.2f} m at most"))  # fmt: skip
     if d.hardware is not None:
-        told.append((float("inf"), d.hardware))
-    before = "; ".join(text for _, text in sorted(told))
+        causes.append((float("inf"), d.hardware))
+    before = "; ".join(text for _, text in sorted(causes))
     return f"{end}. Before: {before}." if before else f"{end}."
 
 
 def cause(d: Diagnosis, steps: int) -> str:
-    """The cause of a loss in a few words, without numbers and sides, to count by."""
+    """Return the cause of a loss in a few words, without numbers and sides, to count by."""
     if d.loss in ("diverged", "error", "down"):
         return LOSSES[d.loss]
     first = "no motor of the legs at its limit"
@@ -97,27 +97,27 @@ def cause(d: Diagnosis, steps: int) -> str:
 
 
 def _fell_before(d: Diagnosis) -> bool:
-    """Whether the capture point had left the support for good when the QP first failed: no torques
-    then bring it back, and a foot that tilts or lifts leaves the QP without the forces that it
-    needs. The failure is a consequence of the fall, not its cause."""
+    """Return whether the capture point had left the support for good when the QP first failed: no
+    torques then bring it back, and a foot that tilts or lifts leaves the QP without the forces that
+    it needs. The failure is a consequence of the fall, not its cause."""
     return d.failures_from is not None and (d.capture_left or float("inf")) <= d.failures_from
 
 
 def losses(lost: Iterable[tuple[Diagnosis, int]]) -> list[Loss]:
-    """The causes of lost trials (diagnosis, steps), the most frequent one first."""
+    """Return the causes of lost trials (diagnosis, steps), the most frequent one first."""
     counts = Counter(cause(d, steps) for d, steps in lost if d.loss is not None)
     return [{"cause": name, "trials": count} for name, count in counts.most_common()]
 
 
-def told_losses(found: list[Loss]) -> str:
-    """The three most frequent causes in a line: of 57 losses 31: …; 9: …"""
+def losses_text(found: list[Loss]) -> str:
+    """Return the three most frequent causes in a line: of 57 losses 31: …; 9: …"""
     total = sum(loss["trials"] for loss in found)
     some = "; ".join(f"{loss['trials']}: {loss['cause']}" for loss in found[:3])
     return f"of {total} losses {some}" if found else ""
 
 
-def push_told(push: Push | Kick) -> str:
-    """A push or a kick in words."""
+def push_text(push: Push | Kick) -> str:
+    """Return a push or a kick in words."""
     where = f"{push.direction:g}° ({towards(push.direction)}), at {push.start:.2f} s"
     if isinstance(push, Kick):
         return f"a kick of {push.delta_v:.2f} m/s towards {where}"
@@ -126,5 +126,5 @@ def push_told(push: Push | Kick) -> str:
 
 
 def towards(direction: float) -> str:
-    """The name of the nearest of eight directions [deg]."""
+    """Return the name of the nearest of eight directions [deg]."""
     return DIRECTIONS[round(direction / 45.0) % len(DIRECTIONS)]

@@ -1,4 +1,4 @@
-"""Playing a suite with several controllers: `poise evaluate` and `poise benchmark`."""
+"""Run a suite with several controllers: `poise evaluate` and `poise benchmark`."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -41,36 +41,35 @@ def evaluate(
     console: Console | None = None,
     allow: str | Iterable[str] = (),
 ) -> Summary:
-    """Play a suite with some controllers and write what came of it; returns the summary.
+    """Run a suite with several controllers and write the outcomes; return the summary.
 
-    `out` gets settings.yaml, trials.jsonl, trials.csv, summary.json and, with pushes, plots. Trials
-    that `out` already holds are not played again, be it stopped or finished; controllers that it
-    holds besides stay in the result. The result is the same, bit for bit, for any `workers` and
-    `backend`.
+    Write settings.yaml, trials.jsonl, trials.csv, summary.json and, with pushes, plots to `out`.
+    Trials that `out` already holds, stopped or finished, are not repeated. Other controllers in
+    `out` stay in the result. The result is bitwise identical for any `workers` and `backend`.
 
     Args:
-        controllers: names as `load_agent` takes them, or folders of several training seeds; all
-            different. The first is the reference of the others.
+        controllers: distinct names as for `load_agent`, or folders of several training seeds. The
+            first is the reference.
         suite: a packaged suite or a path to a ``.yaml`` of one.
         out: the folder to write to.
         robot: a packaged robot or a path to its description.
         seed: of the trials.
         workers: number of processes; None for all cores.
         backend: local, joblib or ray.
-        trials: instead of the number of the suite's only part (of an envelope, in its second
-            stage); of a suite of several parts, at most as many in every cell.
-        limits: what pushes are measured by, see `load_limits`.
-        motions: names and files of motions, for a suite that performs some, instead of its own.
-        realism: a packaged level of realism or a path to one, instead of the suite's.
-        get_up: a robot that falls has 10 s to get up again, which is a figure of its own.
-        physics: a packaged engine or a path to its settings, instead of the suite's.
-        overwrite: replace what `out` holds.
-        console: where progress and tables are printed; None: nowhere.
-        allow: controllers from outside (``module:Class``) that may run though they are not among
-            `controllers`, but named by what `out` holds, a policy's folder or a file.
+        trials: replaces the number of trials of a suite with one part (of an envelope, that of its
+            second stage); caps the number in every cell of a suite with several parts.
+        limits: reference impulses of pushes, see `load_limits`.
+        motions: names and files of motions that replace those of a suite.
+        realism: a packaged realism level or a path to one that replaces the suite's.
+        get_up: give a fallen robot 10 s to get up again, reported as a separate figure.
+        physics: a packaged engine or a path to its settings that replaces the suite's.
+        overwrite: replace the contents of `out`.
+        console: for progress and tables; None: no output.
+        allow: external controllers (``module:Class``) that may run although only `out`, a policy's
+            folder or a file names them.
 
     Raises:
-        ConfigError: anything named does not exist or is not valid; nothing is written then.
+        ConfigError: invalid input; nothing is written.
         PoiseError: a file cannot be written, or a worker has died.
     """
     if not controllers:
@@ -100,11 +99,11 @@ def benchmark(
     console: Console | None = None,
     allow: str | Iterable[str] = (),
 ) -> Summary:
-    """Rank controllers by a suite: `evaluate` with pushes measured by the ankle limit.
+    """Rank controllers by a suite: `evaluate` with pushes scaled by the ankle limit.
 
-    That limit is physics, so a result stays comparable when a controller changes. All are compared
-    with momentum-qp, and the time of a control tick is measured, which alone is not the same for
-    any `workers`.
+    The ankle limit depends on the robot alone, so results stay comparable when a controller
+    changes. The reference is momentum-qp. The time of a control tick is measured in addition; it
+    alone varies with `workers`.
 
     Args:
         controllers: as of `evaluate`; none: `default_controllers`.
@@ -124,10 +123,10 @@ def benchmark(
 
 
 def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
-    """The reference, all other packaged controllers that can rest, and the robot's policies.
+    """Return the reference, the other packaged controllers that stand still, and the policies.
 
-    Controllers that walk, and policies on them, are left out: where nothing is commanded they are
-    `feedback-step`.
+    Controllers that walk, and policies on them, are left out: without commands they are equivalent
+    to `feedback-step`.
     """
     elsewhere = {REFERENCE, *RESTLESS, *walking_controllers()}
     others = (name for name in packaged("controllers") if name not in elsewhere)
@@ -136,14 +135,14 @@ def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
 
 
 def packaged_policies(robot: str) -> list[str]:
-    """The packaged policies that were trained on the robot of this name."""
+    """Return the packaged policies that were trained on the robot of this name."""
     folder = packaged_folder("policies")
     states = {name: read_json(folder / name / "state.json") for name in packaged("policies")}
     return [name for name, state in states.items() if state["robot"] == robot]
 
 
 def walks(policy: str) -> bool:
-    """Whether this packaged policy moves the steps of a walk."""
+    """Return whether this packaged policy moves the steps of a walk."""
     config = read_yaml(packaged_folder("policies") / policy / "config.yaml")
     return bool(config.get("action") == "walk")
 

@@ -32,34 +32,34 @@ Key = tuple[str, int]  # controller, number of the trial
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything that decides a result, but for the machine."""
+    """Everything that determines a result, except the machine."""
 
     format: int  #: of the folder
-    suite_name: str  #: as the user wrote it
+    suite_name: str  #: as typed by the user
     suite: dict[str, Any]  #: its fields
-    robot: str  #: name or path, as the user wrote it
-    robot_fingerprint: str  #: of what was loaded
+    robot: str  #: name or path, as typed by the user
+    robot_fingerprint: str  #: of the loaded robot
     seed: int = field(metadata={"min": 0})  #: of the trials
-    limits: LimitTable | None  #: what pushes are measured by; None: the ankle limit
-    versions: dict[str, str]  #: of what computes the result
-    controllers: dict[str, str]  #: name → fingerprint, in the order in which they came
+    limits: LimitTable | None  #: reference impulses of pushes; None: the ankle limit
+    versions: dict[str, str]  #: of Python and the libraries
+    controllers: dict[str, str]  #: name → fingerprint, in order of addition
     #: name → hash of the motions that are performed
     motions: dict[str, str] = field(default_factory=dict, metadata={"omit": "default"})
 
 
 class ResultFolder:
-    """Opens a new, an interrupted or a finished result.
+    """Open a new, an interrupted or a finished result.
 
-    `finished` holds the outcomes that were there, by controller and number; `settings` the given
-    ones, with the controllers that the folder has besides; `damaged` counts unreadable lines.
+    `finished` holds the outcomes found in the folder by controller and number, `settings` the given
+    ones with the folder's other controllers, `damaged` the number of unreadable lines.
 
     Args:
         path: the folder; made if missing.
         settings: of this result.
         overwrite: remove what an earlier result has left there.
-        closed: whether no controllers can be added, because trials depend on who takes part.
+        closed: whether no controllers can be added, as trials depend on the set of controllers.
         ready: called with the settings of the whole folder before anything is written; what it
-            raises leaves the folder as it was.
+            raises leaves the folder unchanged.
 
     Raises:
         ConfigError: the folder holds something else, and `overwrite` is off; nothing is written.
@@ -97,18 +97,18 @@ class ResultFolder:
         self.finished[controller, number] = outcome
 
     def close(self) -> None:
-        """Stop; what is finished stays."""
+        """Close the folder; finished trials stay."""
         self._log.close()
         self._lock.release()
 
     def finish(self, rows: Sequence[Mapping[str, object]], summary: Summary) -> None:
-        """Write the trials and, last, the summary."""
+        """Write the trials, then the summary."""
         write_atomic(self.path / TRIALS, csv_text(rows, COLUMNS))
         write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
         self.close()
 
     def _check(self, closed: bool) -> Settings:
-        """Refuse to go on from anything but this result; returns its settings."""
+        """Raise ConfigError unless the folder holds this result; return its settings."""
         path = self.path
         fixed = [name for name in Settings.__dataclass_fields__ if closed or name != "controllers"]
         before = _check_same(path, {name: getattr(self.settings, name) for name in fixed})
@@ -124,7 +124,7 @@ class ResultFolder:
 
 
 def check_folder(path: Path, known: Mapping[str, object], overwrite: bool) -> None:
-    """Refuse, before anything is loaded, what `ResultFolder` would for the settings `known`.
+    """Raise the errors of `ResultFolder` for the settings `known`, before anything is loaded.
 
     Raises ConfigError and PoiseError as `ResultFolder`.
     """
@@ -139,7 +139,7 @@ def holds_files(path: Path) -> bool:
 
 
 def _check_same(path: Path, known: Mapping[str, object]) -> Settings:
-    """Refuse to go on from a result whose settings are not those `known`; returns them all."""
+    """Raise ConfigError unless the result has the settings `known`; return all of them."""
     if not (path / SETTINGS).exists():
         raise ConfigError(f"holds files of something else: {ADVICE}", source=path, field="out")
     before = read_settings(path)
@@ -153,7 +153,7 @@ def _check_same(path: Path, known: Mapping[str, object]) -> Settings:
 
 
 def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:
-    """Outcomes by controller and number, and how many lines could not be read."""
+    """Return outcomes by controller and number, and how many lines could not be read."""
     path = folder / LOG
     entries, damaged = read_log(path)
     finished: dict[Key, Outcome] = {}
@@ -167,7 +167,8 @@ def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:
 
 
 def read_settings(folder: Path) -> Settings:
-    """The settings of a result; raises ConfigError where there are none, or of another format."""
+    """Return the settings of a result; raise ConfigError where they are missing or of another
+    format."""
     path = folder / SETTINGS
     data = read_yaml(path)
     check_format(data.get("format"), path)
@@ -178,7 +179,7 @@ def read_settings(folder: Path) -> Settings:
 
 
 def _difference(name: str, old: object, new: object) -> str:
-    """The difference in words."""
+    """Return the difference in words."""
     if isinstance(old, dict) and isinstance(new, dict):
         keys = [k for k in {**old, **new} if old.get(k) != new.get(k)]
         what = ", ".join(f"{k} {old.get(k)}, not {new.get(k)}" for k in keys)

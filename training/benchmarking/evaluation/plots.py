@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.training.benchmarking.metrics.played import (
+from poise.training.benchmarking.metrics.evaluated import (
     DIRECTIONAL,
-    Played,
+    Evaluated,
     ankle_limits,
     by_falls,
     fractions,
@@ -37,28 +37,28 @@ from poise.training.pictures.figures.rates import fall_probability
 from poise.training.pictures.figures.series import SIDES, Series, series
 from poise.training.running.files import CURVE, PLOTS
 
-FEWEST = 5  # trials of a direction whose J50 is drawn
+FEWEST = 5  # trials of a direction whose J50 is plotted
 
 
 def draw_plots(
     folder: Path,
     plan: Plan,
-    played: Mapping[str, Played],
+    evaluated: Mapping[str, Evaluated],
     steps: Mapping[str, NStepLimit] | None = None,
     timesteps: Mapping[str, int | None] | None = None,
 ) -> list[Path]:
-    """Write the plots of a result; returns their paths, none without pushes that have a limit.
+    """Write the plots of a result; return their paths, none without pushes that have a limit.
 
-    Where J50 of directions is measured, they show what `steps` of the first controller that steps
-    could stop; else, the random pushes. Of the policies that a run has kept, J50 is also drawn over
-    the `timesteps` that they have learned from.
+    Plots of J50 by direction include the N-step limits of the first stepping controller; otherwise
+    the random pushes are shown. For several checkpoints of a training run, J50 is also plotted
+    over `timesteps`.
     """
     polar, fall = (folder / name for name in PLOTS)
     limits = plan.limits
-    shown = {name: part(own, *DIRECTIONAL) for name, own in played.items()}
+    shown = {name: part(own, *DIRECTIONAL) for name, own in evaluated.items()}
     directional = all(shown.values())
     if not directional:
-        shown = {name: part(own, "random") for name, own in played.items()}
+        shown = {name: part(own, "random") for name, own in evaluated.items()}
         if not all(shown.values()):
             return []
     label = "push impulse, as a fraction of the ankle limit"
@@ -138,7 +138,7 @@ def _series(fits: Mapping[str, EnvelopeFit]) -> list[Series]:
 
 
 def _left_out(fits: Mapping[str, EnvelopeFit]) -> str:
-    """What is not drawn, in words; empty where all is."""
+    """Return a note on missing directions; empty where all are plotted."""
     enough = [_enough(f) for fit in fits.values() for f in fit.fits]
     if not any(enough):
         return f"Nothing is drawn: no direction has {FEWEST} trials."

@@ -1,4 +1,4 @@
-"""The course of `evaluate` and `benchmark`: what is missing is played, then figures are written."""
+"""The course of `evaluate` and `benchmark`: run missing trials, then write figures."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.envs.terrain.bumps import Bumps
 from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
+from poise.training.benchmarking.metrics.evaluated import RATED, Evaluated, lost
 from poise.training.benchmarking.metrics.motions import suite_repertoire, suite_stage
 from poise.training.benchmarking.metrics.pairs import pair_figures
-from poise.training.benchmarking.metrics.played import RATED, Played, lost
 from poise.training.benchmarking.metrics.seed_groups import seed_groups
 from poise.training.benchmarking.suites.draw import MOST_TRIALS
 from poise.training.benchmarking.suites.plan import Plan
@@ -57,7 +57,7 @@ from .folder import ResultFolder, Settings, check_folder
 from .tables import print_lost, print_summary, ranked
 from .tick_times import tick_times
 
-FEW = 5  # controllers, of which the rate of each is shown while they play
+FEW = 5  # controllers up to which progress shows the rates of each
 GET_UP_TIME = 10.0  # [s] after a fall
 
 
@@ -65,9 +65,9 @@ class Run:
     """One call of `evaluate` or `benchmark`, whose arguments it takes; checks them.
 
     Args:
-        motions: that are performed instead of the suite's; none: its own.
-        reference: whom others are compared with, if it takes part; None: the first.
-        measured: what pushes on the robot are measured by.
+        motions: replace the suite's; none: its own.
+        reference: controller that others are compared with, if it takes part; None: the first.
+        measured: robot → reference impulses of pushes.
         realism: name or file of a level, instead of the suite's; it is then the only one.
         physics: name or file of an engine's settings, instead of the suite's.
     """
@@ -136,7 +136,7 @@ class Run:
         return Plan(self.suite, self.limits, seed, names, self.repertoire.durations, standing)
 
     def play(self, plots: bool = False, timed: bool = False) -> Summary:
-        """Play what is missing and write the result; returns the summary."""
+        """Run missing trials and write the result; return the summary."""
         folder = ResultFolder(self.out, self.settings, self.overwrite, self.suite.paired,
                               self._load_others)  # fmt: skip
         keeps(self.out / LOG, f"the finished trials are kept in {self.out}; "
@@ -144,9 +144,9 @@ class Run:
         with closing(folder):
             if folder.damaged:
                 self.console.print(f"{folder.damaged} lines of {self.out} could not be read: "
-                                   "played again")  # fmt: skip
+                                   "their trials are repeated")  # fmt: skip
             if folder.finished:
-                self.console.print(f"going on after {len(folder.finished)} finished trials")
+                self.console.print(f"continuing after {len(folder.finished)} finished trials")
             self.repertoire.write(self.out)
             names = tuple(folder.settings.controllers)
             agents = {name: self.agents[name] for name in names}
@@ -154,25 +154,25 @@ class Run:
             plan = self._plan(self.settings.seed, names, standing if self.suite.scenarios else ())
             _warm_up(agents.values())
             self._play(folder, plan)
-            played: dict[str, Played] = {
+            evaluated: dict[str, Evaluated] = {
                 name: [(trial, folder.finished[name, trial.number]) for trial in trials]
                 for name, trials in plan.trials(folder.finished).items()
             }
-            outcomes = {name: [o for _, o in played[name]] for name in names}
+            outcomes = {name: [o for _, o in evaluated[name]] for name in names}
             steps = stepping_limits(agents.values(), outcomes, self.limits)
             ticks = tick_times(agents) if timed else dict.fromkeys(names)
-            summary = self._summary(folder, plan, played, steps, ticks)
+            summary = self._summary(folder, plan, evaluated, steps, ticks)
             learned = {name: agent.timesteps for name, agent in agents.items()}
             drawn = []
             if plots:
                 from .plots import draw_plots  # loads Matplotlib
 
-                drawn = draw_plots(self.out, plan, played, steps, learned)
-            rows = [(trial, name, outcome) for name in names for trial, outcome in played[name]]
+                drawn = draw_plots(self.out, plan, evaluated, steps, learned)
+            rows = [(trial, name, outcome) for name in names for trial, outcome in evaluated[name]]
             rows.sort(key=lambda row: row[0].number)  # of one number, in the order of the names
             folder.finish([trial_row(*row) for row in rows], summary)
         print_summary(summary, self.console)
-        numbers = {name: lost(played[name]) for name in summary["ranking"]}
+        numbers = {name: lost(evaluated[name]) for name in summary["ranking"]}
         print_lost(numbers, summary["controllers"], self.out, self.console)
         print_paths([*drawn, self.out / TRIALS, self.out / SUMMARY], self.console)
         return summary
@@ -181,21 +181,23 @@ class Run:
         self,
         folder: ResultFolder,
         plan: Plan,
-        played: Mapping[str, Played],
+        evaluated: Mapping[str, Evaluated],
         steps: Mapping[str, NStepLimit],
         ticks: Mapping[str, float | None],
     ) -> Summary:
         settings, suite = folder.settings, self.suite
-        entries = {name: controller_entry(played[name], plan, steps.get(name)) for name in played}
+        entries = {
+            name: controller_entry(evaluated[name], plan, steps.get(name)) for name in evaluated
+        }
         for name, entry in entries.items():
             entry["tick_us"], entry["fingerprint"] = ticks[name], settings.controllers[name]
             if (learned_from := self.agents[name].timesteps) is not None:
                 entry["timesteps"] = learned_from
-        first = next(iter(played))
-        reference = self.reference if self.reference and self.reference in played else first
-        pairs: Iterator[tuple[str, str]] = combinations(played, 2)
+        first = next(iter(evaluated))
+        reference = self.reference if self.reference and self.reference in evaluated else first
+        pairs: Iterator[tuple[str, str]] = combinations(evaluated, 2)
         if self.reference is not None:
-            pairs = compared(reference, played, ranked(entries))
+            pairs = compared(reference, evaluated, ranked(entries))
         whole: Summary = {
             "format": FORMAT,
             "suite": settings.suite_name,
@@ -206,10 +208,10 @@ class Run:
             "reference": reference,
             "ranking": ranked(entries),
             "controllers": entries,
-            "pairs": [pair_figures(a, b, played, entries) for a, b in pairs],
+            "pairs": [pair_figures(a, b, evaluated, entries) for a, b in pairs],
             "step_limits": curves(steps, suite.push_duration) if "directions" in entries[first]
             else [],
-            "seeds": seed_groups(tuple(played), entries),
+            "seeds": seed_groups(tuple(evaluated), entries),
             **circumstances(self.started, self.executor.workers, self.executor.backend),
         }  # fmt: skip
         if suite.realism != IDEAL:
@@ -219,7 +221,7 @@ class Run:
         return plain(whole)
 
     def _load_others(self, settings: Settings) -> None:
-        """Load what the folder has besides; raises ConfigError for one that has changed."""
+        """Load the folder's other controllers; raise ConfigError for one that has changed."""
         for name in [each for each in settings.controllers if each not in self.agents]:
             with allowing(source=self.out / SETTINGS):
                 self.agents[name] = self.stage.load(name, self.robot)
@@ -230,7 +232,7 @@ class Run:
                 )  # fmt: skip
 
     def _play(self, folder: ResultFolder, plan: Plan) -> None:
-        """Play what is missing: the first stage, then what follows from it."""
+        """Run missing trials: the first stage, then the second, which depends on it."""
 
         def missing(pairs: Iterable[tuple[str, Trial]]) -> list[Job]:
             jobs = [Job(self.stage, name, trial) for name, trial in pairs
@@ -264,7 +266,7 @@ class Run:
 def compared(
     reference: str, names: Iterable[str], ranking: Sequence[str]
 ) -> Iterator[tuple[str, str]]:
-    """Pairs (a, b) of a ranking of many: all against the reference, each against the next best."""
+    """Return pairs (a, b) of a long ranking: all against the reference, and adjacent ranks."""
     yield from ((reference, name) for name in names if name != reference)
     yield from ((b, a) for a, b in pairwise(ranking) if reference not in (a, b))
 
@@ -316,8 +318,8 @@ def _check_engine(engine: Physics, robot: Robot, plan: Plan) -> None:
 
 
 def _warm_up(agents: Iterable[Agent]) -> None:
-    """Compile what is not yet compiled, once, before many processes would do it each."""
+    """Compile all kernels once, instead of in every process."""
     for agent in agents:
-        with contextlib.suppress(Exception):  # a controller from outside: its trials say what
+        with contextlib.suppress(Exception):  # an external controller: its trials record the error
             observation, _ = agent.env.reset(seed=0, options={"push": []})
             agent.env.step(agent.act(observation))

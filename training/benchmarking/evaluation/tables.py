@@ -1,4 +1,4 @@
-"""A result for people: tables in the terminal, what their words mean, rows of the leaderboard."""
+"""Tables of a result in the terminal, their notes, rows of the leaderboard."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from poise.baselines.allowance import allow_words
-from poise.training.benchmarking.diagnosis.words import told_losses
+from poise.training.benchmarking.diagnosis.words import losses_text
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.benchmarking.trials.agents import code_of
 from poise.training.running.columns import (
@@ -20,8 +20,8 @@ from poise.training.running.columns import (
     ETA_WORST,
     FAILURES,
     GAIN,
-    HALF_AT,
     J50_MEAN,
+    J50_SCALED,
     J50_WORST,
     LOST_WON,
     NONE,
@@ -36,7 +36,7 @@ from poise.training.running.columns import (
 )
 from poise.training.running.summary import Entry, Summary
 from poise.training.running.tables import figure_table
-from poise.training.running.terminal import BESIDE, in_parts
+from poise.training.running.terminal import PADDING, in_parts
 from poise.training.running.trial_figures import NOT_FALLEN as CRITERION
 
 from .walk_tables import lasting_tables, level_tables, motion_tables, scenario_tables, walk_tables
@@ -51,8 +51,8 @@ def ranked(entries: Mapping[str, Entry]) -> list[str]:
     """Controllers, the best first: by mean J50, else by the fraction of the limit, else by rate.
 
     The rate is that of the trials without a fall where all walk, else that of recovered ones. Of
-    equal ones the one with more recovered trials is first. Those that took a force from nowhere
-    come last.
+    equal ones the one with more recovered trials is first. Controllers with an external force at a
+    soft root come last.
     """
     key = _measure(entries)[0]
 
@@ -66,10 +66,10 @@ def ranked(entries: Mapping[str, Entry]) -> list[str]:
 def places(
     entries: Mapping[str, Entry], measure: tuple[str, str] | None = None
 ) -> dict[str, int | None]:
-    """The rank of each controller; those whose results print alike share one.
+    """Return the rank of each controller; equal printed results share one.
 
-    None for those that took a force from nowhere, or have no value of the `measure`: a key and the
-    form in which it is printed, by default what they are `ranked` by.
+    None for those with an external force at a soft root, or without a value of the `measure`: a key
+    and its print format, by default that of `ranked`.
     """
     key, form = measure or _measure(entries)
     shown = {name: float(format(_value(entry, key), form)) for name, entry in entries.items()
@@ -79,12 +79,12 @@ def places(
 
 
 def assisted(entry: Entry) -> bool:
-    """True if a soft root took force from nowhere: what is recovered so is not comparable."""
+    """Return whether a soft root took an external force, so recovery is not comparable."""
     return (entry.get("root_force_max") or 0.0) > ROOT_FORCE
 
 
 def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
-    """The key that controllers are ranked by, and the form in which it is printed."""
+    """Return the key that controllers are ranked by, and the form in which it is printed."""
     for key, form in (("j50_mean", ".1f"), ("fraction50", ".2f")):
         if all(key in entry for entry in entries.values()):
             return key, form
@@ -92,7 +92,7 @@ def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
 
 
 def walked(entries: Mapping[str, Entry]) -> bool:
-    """Whether all are judged by falls, see `Entry.criterion`."""
+    """Return whether all are judged by falls, see `Entry.criterion`."""
     return all(entry.get("criterion") == CRITERION for entry in entries.values())
 
 
@@ -103,10 +103,10 @@ def _value(entry: Entry, key: str) -> float:
 def print_summary(summary: Summary, console: Console) -> None:
     """Tables of the controllers and of the pairs, errors, a line per group of training seeds."""
     robot = summary["robot"]["name"]
-    told = [summary["suite"], robot, f"seed {summary['seed']}"]
+    facts = [summary["suite"], robot, f"seed {summary['seed']}"]
     if "physics" in summary:
-        told.append(summary["physics"])
-    title = escape(" · ".join(told))
+        facts.append(summary["physics"])
+    title = escape(" · ".join(facts))
     cells = {
         heading: texts
         for heading, texts in table_cells(summary).items()
@@ -114,7 +114,7 @@ def print_summary(summary: Summary, console: Console) -> None:
     }
     names, rank = summary["ranking"], places(summary["controllers"])
     named = _room(names, 16)
-    for k, part in enumerate(in_parts(cells, console.width - named - 2 * BESIDE - 3)):
+    for k, part in enumerate(in_parts(cells, console.width - named - 2 * PADDING - 3)):
         table = Table(title=None if k else title, title_justify="left")
         table.add_column("#", justify="right")
         table.add_column("controller", overflow="fold", width=named)
@@ -136,20 +136,20 @@ def print_summary(summary: Summary, console: Console) -> None:
 
 
 def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
-    """What the tables' words mean, of those that are there."""
+    """Return explanations of the headings in the tables."""
     notes = []
-    if (half := replace(HALF_AT, unit=f"× {summary['scale']}").heading) in headings:
+    if (half := replace(J50_SCALED, unit=f"× {summary['scale']}").heading) in headings:
         notes.append(f"{half}: half of the pushes of this size are recovered, with the 95 % "
                      "interval; larger is better")  # fmt: skip
     if walked(summary["controllers"]):
         notes.append(f"J50, the order and pairs of walks are by falls; {NOT_FALLEN.name} is of the "
-                     f"pushes that all meet; {AS_COMMANDED.name}: the last two strides are as near "
+                     f"pushes common to all; {AS_COMMANDED.name}: the last two strides are as near "
                      "to the command as the controller's own before the push, within 0.05 m/s and "
                      "5 °/s")  # fmt: skip
     if STEPS_TAKEN.heading in headings:
         notes.append(f"{STEPS_TAKEN.heading}: of all trials, those that were lost too")
     of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
-    if FAILURES.heading in headings and None not in of_won:  # results of old have none
+    if FAILURES.heading in headings and None not in of_won:  # older results lack it
         notes.append(f"{FAILURES.heading}: ticks of all trials, also of robots that were falling; "
                      f"{sum(filter(None, of_won))} in trials that were recovered")  # fmt: skip
     p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]
@@ -166,7 +166,7 @@ def print_lost(
     folder: Path,
     console: Console,
 ) -> None:
-    """The numbers of trials that each controller has lost, why, and how to look at one of them.
+    """Print the numbers of each controller's lost trials, the causes, and a command to view one.
 
     Args:
         lost: name → the numbers of the trials that it did not recover, of walks those that fell.
@@ -182,8 +182,8 @@ def print_lost(
         command = ["poise", "view", str(folder), "--trial", str(numbers[0]), "--controllers", name]
         command += allow_words(code_of(name))
         lines = [f"lost trials of {name}: {some}{more} ({shlex.join(command)})"]
-        if told := told_losses(entries[name].get("losses", [])):
-            lines.append(f"  {told}")
+        if causes := losses_text(entries[name].get("losses", [])):
+            lines.append(f"  {causes}")
         for line in lines:
             console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
@@ -192,22 +192,22 @@ def table_cells(summary: Summary) -> dict[str, list[str]]:
     """Heading → the text of each controller, in the order of the ranking; "–" where it has none."""
     pairs = {pair["b"]: pair for pair in summary["pairs"] if pair["a"] == summary["reference"]}
     entries = [summary["controllers"][name] for name in summary["ranking"]]
-    told = [{**summary["controllers"][name], **pairs.get(name, {})} for name in summary["ranking"]]
-    of_mix = f" of the {summary['rated']}" if summary["rated"] else ""
-    recovered = replace(RECOVERED, name=f"{RECOVERED.name}{of_mix}")
+    rows = [{**summary["controllers"][name], **pairs.get(name, {})} for name in summary["ranking"]]
+    rated = f", {summary['rated']}" if summary["rated"] else ""
+    recovered = replace(RECOVERED, name=f"{RECOVERED.name}{rated}")
     rates = (recovered, NOT_FALLEN)
     if walked(summary["controllers"]):
         rates = (NOT_FALLEN, AS_COMMANDED)
     figures = (
         *(J50_WORST, ETA_MEAN, ETA_WORST),
-        replace(HALF_AT, unit=f"× {summary['scale']}"),
+        replace(J50_SCALED, unit=f"× {summary['scale']}"),
         *rates,
         *UP_AGAIN,
         *(LOST_WON, P_VALUE, *AT_REST, STEPS_TAKEN, *ROBUST),
     )
     return {
         J50_MEAN.heading: [j50_mean_text(entry) for entry in entries],
-        **{each.heading: [each.text(entry) for entry in told] for each in figures},
+        **{each.heading: [each.text(entry) for entry in rows] for each in figures},
     }
 
 
@@ -227,5 +227,5 @@ def _pairs(summary: Summary, width: int) -> Table:
 
 
 def _room(names: Iterable[str], most: int) -> int:
-    """Width of a column of names that are not to be cut, but for those longer than `most`."""
+    """Return the width of a column of names, at most `most`."""
     return min(max(len(name) for name in names), most)

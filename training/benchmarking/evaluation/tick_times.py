@@ -1,4 +1,4 @@
-"""The time of a control tick is measured here, of all controllers in turn in one process."""
+"""Measure the time of a control tick, of all controllers in turn in one process."""
 
 import contextlib
 import time
@@ -34,8 +34,8 @@ class Clocked(WrappedController):
 
 @contextlib.contextmanager
 def clocked(env: BalanceEnv) -> Iterator[list[float]]:
-    """The seconds that each call of the environment's controller takes, as long as this is open;
-    none of an environment without one."""
+    """The seconds that each call of the environment's controller takes, inside the context;
+    none without a controller."""
     if not isinstance(env, ResidualBalanceEnv):
         yield []
         return
@@ -48,14 +48,14 @@ def clocked(env: BalanceEnv) -> Iterator[list[float]]:
 
 
 def tick_times(agents: dict[str, Agent]) -> dict[str, float | None]:
-    """Median time of a control tick [µs] from Python; None for a controller that raises.
+    """Return the median time of a control tick [µs] from Python; None for a controller that raises.
 
-    For a policy the time of one of its actions is shared among the ticks that it is held for.
+    For a policy, the time of an action is divided among the ticks for which it is held.
     """
     clocks = {name: _Clock(agent) for name, agent in agents.items()}
     for turn in range(ROUNDS):
         for clock in clocks.values():
-            with contextlib.suppress(Exception):  # its trials say what it raised
+            with contextlib.suppress(Exception):  # its trials record the error
                 clock.play(seed=turn)
     return {name: clock.median() for name, clock in clocks.items()}
 

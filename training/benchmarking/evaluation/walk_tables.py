@@ -12,13 +12,13 @@ from poise.training.running.columns import (
     FELL,
     FOLLOWED,
     GUSTS,
-    HELD,
     IN_MOTION,
     J50,
     NONE,
     PERFORMED,
     STEPS,
     STOOD,
+    SUSTAINED,
     TRIED,
     known,
 )
@@ -82,7 +82,7 @@ def motion_tables(summary: Summary) -> Iterator[Table]:
 
 
 def level_tables(summary: Summary) -> Iterator[Table]:
-    """One of all controllers at each level of realism, if the suite has any."""
+    """Yield a table of all controllers at each realism level, if the suite has any."""
     entries = summary["controllers"]
     rows = [
         ([name, level["level"]], level)
@@ -90,11 +90,11 @@ def level_tables(summary: Summary) -> Iterator[Table]:
         for level in entries[name].get("levels", ())
     ]
     if figures := known(AT_LEVEL, [level for _, level in rows]):
-        yield figure_table("at levels of realism", ["controller", "level"], figures, rows)
+        yield figure_table("by realism level", ["controller", "level"], figures, rows)
 
 
 def scenario_names(summary: Summary) -> list[str]:
-    """The scenarios that any controller has played, in the order of the suite."""
+    """Return the scenarios of all controllers, in the order of the suite."""
     entries = summary["controllers"].values()
     most = max(([each["scenario"] for each in entry.get("scenarios", ())] for entry in entries),
                key=len, default=[])  # fmt: skip
@@ -103,7 +103,7 @@ def scenario_names(summary: Summary) -> list[str]:
 
 
 def scenario_cell(found: ScenarioFigures | None) -> str:
-    """The share of a scenario's trials without a fall."""
+    """Return the share of a scenario's trials without a fall."""
     return NONE if found is None else STOOD.text(found)
 
 
@@ -123,6 +123,6 @@ def lasting_tables(summary: Summary) -> Iterator[Table]:
     entries = [(name, summary["controllers"][name]) for name in summary["ranking"]]
     if rows := [([name, own["profile"]], own) for name, entry in entries
                 for own in entry.get("sustained", ())]:  # fmt: skip
-        yield figure_table("sustained pushes", ["controller", "profile"], HELD, rows)
+        yield figure_table("sustained pushes", ["controller", "profile"], SUSTAINED, rows)
     if gusts := [([name], entry["gusts"]) for name, entry in entries if "gusts" in entry]:
         yield figure_table("gusts from one side", ["controller"], GUSTS, gusts)

@@ -1,1 +1,1 @@
-"""The figures of a result are computed here, from trials and how they ended."""
+"""Figures of a result, computed from trials and their outcomes."""

@@ -1,4 +1,4 @@
-"""A controller's entry of summary.json is computed here."""
+"""Compute a controller's entry of summary.json."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,12 +28,9 @@ from poise.training.running.summary import (
 )
 from poise.training.running.trial_figures import NOT_FALLEN, RECOVERED, ScenarioFigures
 
-from .factors import eurobench_figures, factor_figures
-from .lasting import gust_figures, sustained_figures
-from .motions import in_motion, motion_levels
-from .played import (
+from .evaluated import (
     DIRECTIONAL,
-    Played,
+    Evaluated,
     ankle_limits,
     by_falls,
     cells,
@@ -47,55 +44,58 @@ from .played import (
     sectors,
     won,
 )
+from .factors import eurobench_figures, factor_figures
+from .lasting import gust_figures, sustained_figures
+from .motions import in_motion, motion_levels
 from .walking import phase_figures, walk_levels
 
 RANDOM = ("random", "mix")  # parts that the rates of a level are of, where a suite has one
 
 
-def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None) -> Entry:
+def controller_entry(evaluated: Evaluated, plan: Plan, steps: NStepLimit | None = None) -> Entry:
     """All figures of one controller; `steps` is the limit of one that steps."""
-    everything, played = played, once(played)
+    everything, evaluated = evaluated, once(evaluated)
     entry: Entry = {
-        **counts(rated(played)),
-        "criterion": NOT_FALLEN if by_falls(rated(played)) else RECOVERED,
-        "root_force_max": max((outcome.root_force or 0.0) for _, outcome in played),
+        **counts(rated(evaluated)),
+        "criterion": NOT_FALLEN if by_falls(rated(evaluated)) else RECOVERED,
+        "root_force_max": max((outcome.root_force or 0.0) for _, outcome in evaluated),
         "played": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
-    if found := losses((o, o.steps) for t, o in played if not is_won(t, o)):
+    if found := losses((o, o.steps) for t, o in evaluated if not is_won(t, o)):
         entry["losses"] = found
-    if directional := part(played, *DIRECTIONAL):
+    if directional := part(evaluated, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))
-    if pushed := part(played, "walk_push"):
+    if pushed := part(evaluated, "walk_push"):
         entry["phases"] = phase_figures(pushed, entry)
-    if walks := walk_levels(played, plan.suite.duration):
+    if walks := walk_levels(evaluated, plan.suite.duration):
         entry["walks"] = walks
-    if motions := motion_levels(played):
-        entry["motions"], entry["in_motion"] = motions, in_motion(played)
-    if scenarios := _scenarios(part(played, SCENARIOS)):
+    if motions := motion_levels(evaluated):
+        entry["motions"], entry["in_motion"] = motions, in_motion(evaluated)
+    if scenarios := _scenarios(part(evaluated, SCENARIOS)):
         entry["scenarios"] = scenarios
-    if sustained := part(played, "sustained"):
+    if sustained := part(evaluated, "sustained"):
         entry["sustained"] = sustained_figures(sustained, plan.limits.robot.mass)
-    if gusts := part(played, "gusts"):
+    if gusts := part(evaluated, "gusts"):
         entry["gusts"] = gust_figures(gusts)
-    if random := part(played, "random"):
+    if random := part(evaluated, "random"):
         entry.update(_fractions(random, plan.limits))
-    if factors := factor_figures(part(played, "factors"), plan.standard):
+    if factors := factor_figures(part(evaluated, "factors"), plan.standard):
         entry["factors"] = factors
-    if part(played, "envelope", "margin"):
-        entry["eurobench"] = eurobench_figures(played, plan.limits)
+    if part(evaluated, "envelope", "margin"):
+        entry["eurobench"] = eurobench_figures(evaluated, plan.limits)
     if plan.suite.levels:
         entry["levels"] = _levels(everything, plan.suite)
     return entry
 
 
 def envelope(
-    played: Played, limits: PushLimits, steps: NStepLimit | None = None
+    evaluated: Evaluated, limits: PushLimits, steps: NStepLimit | None = None
 ) -> EnvelopeFigures:
     """J50 [N·s], J90, η and the fraction of the limit of `steps` in each direction; their means."""
-    direction, impulse, duration = pushes(played)
-    recovered, mass = won(played), limits.robot.mass
-    over_limit = impulse / ankle_limits(played, limits)
+    direction, impulse, duration = pushes(evaluated)
+    recovered, mass = won(evaluated), limits.robot.mass
+    over_limit = impulse / ankle_limits(evaluated, limits)
     fit = mean_over_directions(direction, impulse, recovered)
     etas = mean_over_directions(direction, over_limit, recovered)
     ankle = [limits.ankle(angle, float(duration[0])) for angle in fit.directions]
@@ -134,9 +134,9 @@ def envelope(
     return figures
 
 
-def _fractions(played: Played, limits: PushLimits) -> Fractions:
-    together = mean_over_directions(np.zeros(len(played)), fractions(played), won(played))
-    (one,), by_sector = together.fits, sectors(played)
+def _fractions(evaluated: Evaluated, limits: PushLimits) -> Fractions:
+    together = mean_over_directions(np.zeros(len(evaluated)), fractions(evaluated), won(evaluated))
+    (one,), by_sector = together.fits, sectors(evaluated)
     found = [
         {"direction": angle, **fitted(f, "fraction50")}
         for angle, f in zip(by_sector.directions, by_sector.fits, strict=True)
@@ -150,10 +150,10 @@ def _fractions(played: Played, limits: PushLimits) -> Fractions:
     }
 
 
-def _scenarios(played: Played) -> list[ScenarioFigures]:
-    """Of each scenario that a controller has played, in the order of the suite."""
+def _scenarios(evaluated: Evaluated) -> list[ScenarioFigures]:
+    """Return the figures of each scenario, in the order of the suite."""
     found: list[ScenarioFigures] = []
-    for name, own in cells(played, lambda trial: str(trial.level)).items():
+    for name, own in cells(evaluated, lambda trial: str(trial.level)).items():
         figures: ScenarioFigures = {"scenario": name, **counts(own)}
         if speeds := [o.speed_ahead for _, o in own if o.speed_ahead is not None]:
             figures["speed_ahead"] = sum(speeds) / len(speeds)
@@ -161,11 +161,11 @@ def _scenarios(played: Played) -> list[ScenarioFigures]:
     return found
 
 
-def _levels(played: Played, suite: Suite) -> list[RealismLevel]:
+def _levels(evaluated: Evaluated, suite: Suite) -> list[RealismLevel]:
     """Of the suite's own level, then of each of its `levels`; J50 also over that of the first."""
 
-    def named(names: Sequence[str], level: str | None) -> Played:
-        return part(played, *(n if level is None else at_level(n, level) for n in names))
+    def named(names: Sequence[str], level: str | None) -> Evaluated:
+        return part(evaluated, *(n if level is None else at_level(n, level) for n in names))
 
     found: list[RealismLevel] = []
     for level in (None, *suite.levels):
@@ -199,7 +199,7 @@ def _levels(played: Played, suite: Suite) -> list[RealismLevel]:
 
 
 def robot_figures(limits: PushLimits) -> RobotFigures:
-    """The robot's figures that a report needs."""
+    """Return the robot's figures that a report needs."""
     robot = limits.robot
     return {
         "name": robot.name,

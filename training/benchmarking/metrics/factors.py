@@ -14,14 +14,15 @@ from poise.training.benchmarking.suites.factors import STANDARD
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.running.summary import Eurobench, Factor, Level, MarginFigures
 
-from .played import Played, cells, part, pushes, rate, won
+from .evaluated import Evaluated, cells, part, pushes, rate, won
 
 NAMED = ("body", "realism")  # factors whose levels are names, not numbers
 
 
-def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
-    """Recovered rate of every level, and what it lost and won against the standard case."""
-    found_cells = cells(played, lambda trial: (str(trial.factor), str(trial.level)))
+def factor_figures(evaluated: Evaluated, standard: Mapping[str, str]) -> list[Factor]:
+    """Return the recovered rate of every level, and what it lost and won against the standard
+    case."""
+    found_cells = cells(evaluated, lambda trial: (str(trial.factor), str(trial.level)))
     base = found_cells.pop((STANDARD, STANDARD), [])
     found: dict[str, list[Level]] = {}
     for (factor, level), own in found_cells.items():
@@ -34,38 +35,39 @@ def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
             for factor, levels in found.items()]  # fmt: skip
 
 
-def _level(level: str, played: Played, base: Played) -> Level:
-    pairs = list(zip(won(played).tolist(), won(base).tolist(), strict=True))
+def _level(level: str, evaluated: Evaluated, base: Evaluated) -> Level:
+    pairs = list(zip(won(evaluated).tolist(), won(base).tolist(), strict=True))
     lost = sum(b and not r for r, b in pairs)
     gained = sum(r and not b for r, b in pairs)
     return {
         "level": level,
         "standard": False,
-        **rate(played),
+        **rate(evaluated),
         "lost": lost,
         "won": gained,
         "p_mcnemar": mcnemar(lost, gained),
     }
 
 
-def eurobench_figures(played: Played, limits: PushLimits) -> Eurobench:
-    """Sway and recovery time over recovered standard pushes; stability margins."""
-    plain = [outcome for _, outcome in part(played, "envelope") if outcome.recovered]
+def eurobench_figures(evaluated: Evaluated, limits: PushLimits) -> Eurobench:
+    """Return the sway and recovery time over recovered standard pushes; stability margins."""
+    plain = [outcome for _, outcome in part(evaluated, "envelope") if outcome.recovered]
     return {
         "body_sway_mean": mean_or_none([outcome.sway for outcome in plain]),
         "recovery_time_mean": mean_or_none([outcome.sway_recovery for outcome in plain]),
         "recovery_time_trials": sum(outcome.sway_recovery is not None for outcome in plain),
         "trials": len(plain),
-        "margins": _margins(part(played, "margin"), limits),
+        "margins": _margins(part(evaluated, "margin"), limits),
     }
 
 
-def _margins(played: Played, limits: PushLimits) -> list[MarginFigures]:
-    """Stability margin per direction: force [N], energy [J], and both on a human's scale."""
-    if not played:
+def _margins(evaluated: Evaluated, limits: PushLimits) -> list[MarginFigures]:
+    """Return the stability margin per direction: force [N], energy [J], and both on a human's
+    scale."""
+    if not evaluated:
         return []
-    direction, impulse, duration = pushes(played)
-    fallen = ~won(played)  # not recovered counts as a fall: the protocol knows no third end
+    direction, impulse, duration = pushes(evaluated)
+    fallen = ~won(evaluated)  # not recovered counts as a fall: the protocol has no third outcome
     robot, found = limits.robot, []
     for angle in dict.fromkeys(direction.tolist()):
         here = direction == angle

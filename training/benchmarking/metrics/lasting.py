@@ -1,4 +1,4 @@
-"""Figures of pushes that last, and of gusts: which force is held, how many pushes are survived."""
+"""Figures of sustained pushes (force resisted) and of gusts (number survived)."""
 
 import numpy as np
 
@@ -7,26 +7,26 @@ from poise.training.benchmarking.statistics.rates import percentile_interval
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.running.trial_figures import GustFigures, SustainedFigures
 
-from .played import Played, counts
+from .evaluated import Evaluated, counts
 
 ALL = "all"
 RESAMPLES = 2000
 
 
 def held(outcome: Outcome) -> bool:
-    """Whether the robot did not fall."""
+    """Return whether the robot did not fall."""
     return not outcome.fallen and outcome.error is None
 
 
-def sustained_figures(played: Played, mass: float) -> list[SustainedFigures]:
+def sustained_figures(evaluated: Evaluated, mass: float) -> list[SustainedFigures]:
     """Of all pushes, then of each profile.
 
-    F50 [N] is the largest force of a push that half of the trials hold, without a fall: fitted
-    over that force as J50 is over the impulse.
+    F50 [N] is the peak force that half of the trials resist without a fall, fitted over that force
+    as J50 is over the impulse.
     """
-    profiles = dict.fromkeys(str(trial.level) for trial, _ in played)
-    groups = {ALL: played} | {
-        name: [each for each in played if each[0].level == name] for name in profiles
+    profiles = dict.fromkeys(str(trial.level) for trial, _ in evaluated)
+    groups = {ALL: evaluated} | {
+        name: [each for each in evaluated if each[0].level == name] for name in profiles
     }
     found: list[SustainedFigures] = []
     for name, own in groups.items():
@@ -47,7 +47,8 @@ def sustained_figures(played: Played, mass: float) -> list[SustainedFigures]:
 
 
 def survived(trial: Trial, outcome: Outcome) -> int:
-    """The number of pushes after which the robot still stood: until the next one, or the end."""
+    """Return the number of pushes after which the robot still stood: until the next one, or the
+    end."""
     if held(outcome):
         return len(trial.pushes)
     if outcome.fall_time is None:  # the controller raised
@@ -56,14 +57,14 @@ def survived(trial: Trial, outcome: Outcome) -> int:
     return sum(start <= outcome.fall_time for start in later)
 
 
-def gust_figures(played: Played) -> GustFigures:
-    """The counts, and the mean number of pushes survived with its bootstrap interval."""
-    numbers = np.array([survived(trial, outcome) for trial, outcome in played], dtype=float)
+def gust_figures(evaluated: Evaluated) -> GustFigures:
+    """Return the counts, and the mean number of pushes survived with its bootstrap interval."""
+    numbers = np.array([survived(trial, outcome) for trial, outcome in evaluated], dtype=float)
     rng = np.random.default_rng(0)
     drawn = rng.choice(numbers, (RESAMPLES, len(numbers))).mean(axis=1)
     return {
-        **counts(played),
-        "pushes": max(len(trial.pushes) for trial, _ in played),
+        **counts(evaluated),
+        "pushes": max(len(trial.pushes) for trial, _ in evaluated),
         "survived_mean": float(numbers.mean()),
         "survived_ci95": percentile_interval(drawn, (len(numbers), 1)),
         "first_survived": int((numbers >= 1.0).sum()),

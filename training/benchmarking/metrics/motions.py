@@ -23,16 +23,16 @@ from poise.training.motion.following.repertoire import (
 )
 from poise.training.running.trial_figures import InMotion, MotionLevel, MotionMeans
 
-from .played import Played, cells, fitted, part, pushes, won
+from .evaluated import Evaluated, cells, fitted, part, pushes, won
 
 MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level has the mean of
 
 
-def suite_repertoire(suite: Suite, robot: Robot, folder: Path, anew: bool) -> Repertoire:
-    """The motions of a suite, empty where it has none; raises as `load_repertoire`."""
+def suite_repertoire(suite: Suite, robot: Robot, folder: Path, overwrite: bool) -> Repertoire:
+    """Return the motions of a suite, empty where it has none; raise as `load_repertoire`."""
     if suite.motions is None:
         return Repertoire({}, {}, {})
-    return load_repertoire(suite.motions.names, suite.motions.labels, robot, folder, anew)
+    return load_repertoire(suite.motions.names, suite.motions.labels, robot, folder, overwrite)
 
 
 def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
@@ -47,9 +47,9 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
     return Stage(robot, LONGEST, suite.noise, motions, chosen.tempo, physics=suite.physics)
 
 
-def motion_levels(played: Played) -> list[MotionLevel]:
+def motion_levels(evaluated: Evaluated) -> list[MotionLevel]:
     """Every share of J50: each motion, and all of several; [] where nothing is performed."""
-    moving = part(played, PART)
+    moving = part(evaluated, PART)
     found: dict[tuple[float, str | None], list[tuple[Trial, Outcome]]] = {}
     found |= cells(moving, lambda trial: (trial.share or 0.0, trial.motion))
     if len({trial.motion for trial, _ in moving}) > 1:
@@ -75,19 +75,19 @@ def _level(share: float, name: str | None, outcomes: Sequence[Outcome]) -> Motio
     }
 
 
-def in_motion(played: Played) -> list[InMotion]:
+def in_motion(evaluated: Evaluated) -> list[InMotion]:
     """J50 in each motion, their mean, and that of standing, as shares of the controller's J50.
 
     Shares of all directions are fitted together. The ratio of two such shares is that of the J50s,
     since both are of the same one. Its interval comes of those of the two [Zou08].
     """
-    moving = part([(t, o) for t, o in played if t.push is not None], PART)
+    moving = part([(t, o) for t, o in evaluated if t.push is not None], PART)
     if not moving:
         return []
     shares = np.array([trial.share for trial, _ in moving], dtype=float)
     names = list(dict.fromkeys(trial.motion for trial, _ in moving))
     fit = mean_over_directions([names.index(t.motion) for t, _ in moving], shares, won(moving))
-    standing = _standing(played, moving)
+    standing = _standing(evaluated, moving)
     found: list[InMotion] = []
     if standing is not None:
         found.append(_row(STANDING, fitted(standing.fits[0], "share50"), None))
@@ -107,9 +107,9 @@ def in_motion(played: Played) -> list[InMotion]:
     return found
 
 
-def _standing(played: Played, moving: Played) -> EnvelopeFit | None:
-    """The fit of the pushes that it stood for; None where there are none."""
-    stood = part(played, STANDING)
+def _standing(evaluated: Evaluated, moving: Evaluated) -> EnvelopeFit | None:
+    """Return the fit of the pushes while standing; None without any."""
+    stood = part(evaluated, STANDING)
     if not stood:
         return None
     j50 = {t.push.direction: t.push.impulse / t.share for t, _ in moving if t.push and t.share}
@@ -119,7 +119,7 @@ def _standing(played: Played, moving: Played) -> EnvelopeFit | None:
 
 
 def _row(name: str | None, figures: dict[str, Any], standing: EnvelopeFit | None) -> InMotion:
-    """The figures of a motion, and its share over that of standing, if there is one."""
+    """Return the figures of a motion, and its share over that of standing, if there is one."""
     over, ends = None, None
     if standing is not None:
         here = figures["share50"], figures["share50_ci95"]

@@ -1,4 +1,4 @@
-"""Two controllers compared: on the trials that both met, and by their mean J50."""
+"""Two controllers compared: on their common trials, and by their mean J50."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -10,31 +10,31 @@ from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.benchmarking.trials.trial import won as is_won
 from poise.training.running.summary import Entry, Pair, Paired
 
-from .played import DIRECTIONAL, Played, part, pushes, rated, won
+from .evaluated import DIRECTIONAL, Evaluated, part, pushes, rated, won
 
 
 def pair_figures(
-    a: str, b: str, played: Mapping[str, Played], entries: Mapping[str, Entry]
+    a: str, b: str, evaluated: Mapping[str, Evaluated], entries: Mapping[str, Entry]
 ) -> Pair:
-    """b against a: McNemar on the rated trials that both met, and on all; gain in mean J50.
+    """Compare b with a: McNemar's test on the common rated trials and on all, gain in mean J50.
 
-    The gain is paired, with one for each direction, where both met the same pushes.
+    The gain is paired, and given for each direction, where both had the same pushes.
     """
-    met = alike(played[a], played[b])
-    every, rated_numbers = paired(met), {trial.number for trial, _ in rated(played[a])}
+    met = alike(evaluated[a], evaluated[b])
+    every, rated_numbers = paired(met), {trial.number for trial, _ in rated(evaluated[a])}
     pair: Pair = {"a": a, "b": b, "all": every}
     if own := paired([each for each in met if each[0].number in rated_numbers]):
         pair |= own
-    pair["identical"] = len(met) == len(played[a]) == len(played[b]) and all(
+    pair["identical"] = len(met) == len(evaluated[a]) == len(evaluated[b]) and all(
         one == two for _, one, two in met
     )
     if "j50_mean" in entries[a] and "j50_mean" in entries[b]:
-        _add_gain(pair, [part(played[name], *DIRECTIONAL) for name in (a, b)], entries)
+        _add_gain(pair, [part(evaluated[name], *DIRECTIONAL) for name in (a, b)], entries)
     return pair
 
 
-def alike(a: Played, b: Played) -> list[tuple[Trial, Outcome, Outcome]]:
-    """The trials that both met, alike in all: second stages share numbers, but not pushes."""
+def alike(a: Evaluated, b: Evaluated) -> list[tuple[Trial, Outcome, Outcome]]:
+    """Return the trials common to both: second stages share numbers, but not pushes."""
     others = {trial.number: (trial, outcome) for trial, outcome in b}
     return [
         (trial, outcome, others[trial.number][1])
@@ -44,12 +44,12 @@ def alike(a: Played, b: Played) -> list[tuple[Trial, Outcome, Outcome]]:
 
 
 def paired(met: list[tuple[Trial, Outcome, Outcome]]) -> Paired | None:
-    """Counts of the trials that both met; None without any."""
+    """Return counts of the common trials; None without any."""
     return counted((is_won(trial, one), is_won(trial, two)) for trial, one, two in met)
 
 
 def counted(won_by: Iterable[tuple[bool, bool]]) -> Paired | None:
-    """Counts of trials by who won them, a or b, with McNemar's test of them."""
+    """Return counts of trials won by a, b, both or neither, with McNemar's test."""
     found = Counter(won_by)
     if not found:
         return None
@@ -67,7 +67,7 @@ def counted(won_by: Iterable[tuple[bool, bool]]) -> Paired | None:
     }
 
 
-def _add_gain(pair: Pair, directional: list[Played], entries: Mapping[str, Entry]) -> None:
+def _add_gain(pair: Pair, directional: list[Evaluated], entries: Mapping[str, Entry]) -> None:
     met = alike(*directional)
     if len(met) == len(directional[0]) == len(directional[1]):
         direction, impulse, _ = pushes(directional[0])

@@ -17,10 +17,11 @@ from poise.training.running.summary import Entry, SeedGroup
 
 
 def seed_groups(names: Sequence[str], entries: Mapping[str, Entry]) -> list[SeedGroup]:
-    """Interquartile means over the seeds of every configuration that has several run folders.
+    """Return the interquartile means over the seeds of every configuration that has several run
+    folders.
 
     `entries` are those of a summary. The scores of η are those of every direction (the tasks);
-    J50's mean and the recovered rate are one task each. The seeds are drawn anew for every task
+    J50's mean and the recovered rate are one task each. Seeds are resampled for every task
     [Agarwal21]. Checkpoints of one run, which share a seed, are no sample of seeds: a
     configuration with two of the same is left out.
     """
@@ -37,7 +38,7 @@ def seed_groups(names: Sequence[str], entries: Mapping[str, Entry]) -> list[Seed
 
 
 def seed_lines(groups: Sequence[SeedGroup]) -> list[str]:
-    """A line of text per group and figure, for the terminal."""
+    """Return a line for each group and figure, for the terminal."""
     lines = []
     for group in groups:
         head = f"IQM over {len(group['members'])} training seeds, {group['name']}:"
@@ -54,7 +55,7 @@ def seed_lines(groups: Sequence[SeedGroup]) -> list[str]:
 
 
 def _configuration(folder: str) -> tuple[str, int]:
-    """The configuration of a run but for its seed, and the seed."""
+    """Return the configuration of a run without its seed, and the seed."""
     from poise.training.learning.policy import load_policy
 
     try:

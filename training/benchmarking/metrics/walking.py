@@ -8,51 +8,52 @@ from poise.training.benchmarking.statistics.bootstrap import mean_over_direction
 from poise.training.benchmarking.statistics.rates import mean_or_none, poisson_interval
 from poise.training.benchmarking.suites.walking import WALKING
 from poise.training.running.summary import EnvelopeFigures
-from poise.training.running.trial_figures import PhaseJ50, StepsAsTold, WalkLevel, WalkMeans
+from poise.training.running.trial_figures import PhaseJ50, StepsAsCommanded, WalkLevel, WalkMeans
 
-from .played import Played, cells, met_by_all, part, rate, won
+from .evaluated import Evaluated, cells, met_by_all, part, rate, won
 
 PHASES = 8  # of a stride
-AS_TOLD = 0.1  # of a step parameter, within which a walk follows its command
-#: figures of a trial that a level has the mean of
+STEP_TOLERANCE = 0.1  # largest error of a step parameter as commanded, as a fraction
+#: figures of a trial that are averaged over a level
 MEANS = tuple(WalkMeans.__annotations__)
 
 
-def walk_levels(played: Played, duration: float) -> list[WalkLevel]:
-    """The levels of the parts that walk, in the order of the suite; trials last `duration` [s].
+def walk_levels(evaluated: Evaluated, duration: float) -> list[WalkLevel]:
+    """Return the levels of the parts that walk, in the order of the suite; trials last `duration`
+    [s].
 
-    Of pushes whose J50 is measured, those that all controllers meet.
+    Of pushes whose J50 is measured, only the first stage, common to all controllers.
     """
-    walked = met_by_all(part(played, *WALKING))
+    walked = met_by_all(part(evaluated, *WALKING))
     found = cells(walked, lambda trial: (trial.part, str(trial.level)))
     return [_level(*key, own, duration) for key, own in found.items()]
 
 
-def _level(name: str, text: str, played: Played, duration: float) -> WalkLevel:
-    outcomes = [outcome for _, outcome in played]
+def _level(name: str, text: str, evaluated: Evaluated, duration: float) -> WalkLevel:
+    outcomes = [outcome for _, outcome in evaluated]
     fallen = sum(outcome.fallen for outcome in outcomes)
     walked = [each for each in outcomes if each.error is None]
     times = [duration if each.fall_time is None else each.fall_time for each in walked]
     minutes = sum(times) / 60.0
     low, high = poisson_interval(fallen)
     means = {key: mean_or_none([getattr(each, key) for each in outcomes]) for key in MEANS}
-    told: StepsAsTold = {}
+    steps: StepsAsCommanded = {}
     if name == "gait":
-        kept = [each.upright and (each.step_error or 0.0) <= AS_TOLD for each in outcomes]
-        told = {"steps_as_told_rate": sum(kept) / len(kept)}
+        kept = [each.upright and (each.step_error or 0.0) <= STEP_TOLERANCE for each in outcomes]
+        steps = {"steps_as_told_rate": sum(kept) / len(kept)}
     return {
         "part": name,
         "level": text,
-        **rate(played),
+        **rate(evaluated),
         "minutes": minutes,
         "falls_per_minute": fallen / minutes if minutes else None,
         "falls_per_minute_ci95": (low / minutes, high / minutes) if minutes else None,
-        **told,
+        **steps,
         **cast(WalkMeans, means),
     }
 
 
-def phase_figures(played: Played, envelope: EnvelopeFigures) -> list[PhaseJ50]:
+def phase_figures(evaluated: Evaluated, envelope: EnvelopeFigures) -> list[PhaseJ50]:
     """J50 [N·s] in each of 8 phases of the stride, over all directions.
 
     Impulses are measured by the J50 of their direction; the fraction of it that half of the pushes
@@ -61,7 +62,7 @@ def phase_figures(played: Played, envelope: EnvelopeFigures) -> list[PhaseJ50]:
     """
     j50 = {entry["direction"]: entry["j50"] for entry in envelope["directions"]}
     phase, fraction, upright = [], [], []
-    for (trial, outcome), held in zip(played, won(played), strict=True):
+    for (trial, outcome), held in zip(evaluated, won(evaluated), strict=True):
         if outcome.push_phase is not None and trial.push is not None and j50[trial.push.direction]:
             phase.append(np.floor(PHASES * outcome.push_phase) % PHASES)
             fraction.append(trial.push.impulse / j50[trial.push.direction])

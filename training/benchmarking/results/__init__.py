@@ -1,1 +1,1 @@
-"""Finished folders of either kind, read back, compared and played again."""
+"""Finished results: read, compared, repeated, packed and published."""

@@ -1,4 +1,4 @@
-"""Two results are compared here, with intervals."""
+"""Compare two results, with intervals."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -46,8 +46,8 @@ class Change:
 
 @dataclass(frozen=True)
 class Comparison:
-    """`settings` are the fields that differ; controllers: in one only, changed, or alike in every
-    trial, which have no `changes` then."""
+    """The differing `settings`; controllers in one result only, changed, or identical in all trials
+    (these have no `changes`)."""
 
     settings: tuple[str, ...]
     only_a: tuple[str, ...]
@@ -60,8 +60,8 @@ class Comparison:
 def compare(a: str | Path, b: str | Path) -> Comparison:
     """Compare two folders written by `poise evaluate` or `poise benchmark`.
 
-    Rates of trials that both have, alike in all, are compared in pairs (McNemar, Newcombe); all
-    else by the intervals of the two figures [Zou08].
+    Rates of common trials are compared in pairs (McNemar, Newcombe), all other figures by their
+    intervals [Zou08].
 
     Raises ConfigError for a folder that holds no finished result.
     """
@@ -121,7 +121,7 @@ def print_comparison(found: Comparison, a: str | Path, b: str | Path, console: C
 
 
 def _outcomes(results: Results, name: str) -> dict[tuple[str, ...], tuple[bool, bool]]:
-    """A mapping from what a trial must share to be a pair, to how it ended."""
+    """Return key of a paired trial → its outcome."""
     return {record.met: (record.recovered, record.upright) for record in results.of(name)}
 
 
@@ -136,7 +136,7 @@ def _changes(name: str, a: Results, b: Results) -> Iterator[Change]:
         rated = a.summary["rated"]
         walked = one.get("criterion") == two.get("criterion") == "not fallen"
         for figure in (NOT_FALLEN, AS_COMMANDED) if walked else (RECOVERED, NOT_FALLEN):
-            title = f"{figure.name} of the {rated}" if rated else figure.name
+            title = f"{figure.name}, {rated}" if rated else figure.name
             yield from _rates(name, title, figure, one, two, a, b, part=rated)
     for (factor, level), before, after in _levels(one, two):
         title = f"{factor} {level}"
@@ -153,7 +153,7 @@ Estimate = tuple[float, Interval]
 
 
 def _by_intervals(name: str, title: str, before: Estimate, after: Estimate) -> Iterator[Change]:
-    """A figure with an interval of its own in both; none where an interval is open."""
+    """Yield a figure with an interval of its own in both; none where an interval is open."""
     around = both_ends(before[1]), both_ends(after[1])
     if around[0] is not None and around[1] is not None:
         change, (low, high) = difference(before[0], around[0], after[0], around[1])
@@ -173,8 +173,11 @@ def _rates(
     *,
     part: str | None = None,
 ) -> Iterator[Change]:
-    """The rate of recovered trials, or of those without a fall: in pairs if both played the same
-    trials, else by intervals; none where an older result does not have it."""
+    """Yield the change of the recovered rate, or of that without a fall.
+
+    It is paired where both results have the same trials, else by intervals; none where an older
+    result lacks the rate.
+    """
     before, after = figure.value(one), figure.value(two)
     if before is None or after is None:
         return

@@ -1,4 +1,4 @@
-"""Walks of older results are judged again, by falls."""
+"""Judge walks of older results again, by falls."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -10,8 +10,8 @@ from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.evaluation.folder import Settings
 from poise.training.benchmarking.evaluation.tables import ranked
 from poise.training.benchmarking.metrics.entry import controller_entry
+from poise.training.benchmarking.metrics.evaluated import Evaluated
 from poise.training.benchmarking.metrics.pairs import pair_figures
-from poise.training.benchmarking.metrics.played import Played
 from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
@@ -26,13 +26,13 @@ KEPT = ("tick_us", "fingerprint", "timesteps")
 def judged_again(
     folder: Path, settings: Settings, summary: Summary, lines: Sequence[Mapping[str, str]]
 ) -> Summary:
-    """The summary, in which the walks of an older result are judged by falls.
+    """Return the summary, in which the walks of an older result are judged by falls.
 
     Such a result counted walks as lost that stayed upright, but differed from their command by more
-    than 0.05 m/s or 5°. Its columns say who fell: J50, the ranking and pairs are computed again
+    than 0.05 m/s or 5°. Its columns contain the falls: J50, ranking and pairs are computed again
     from `lines` of trials.csv. The rate of `recovered` stays as it was judged, since older columns
     have no error of the last strides. Figures over training seeds and over the limits of steps are
-    left out. A `PoiseWarning` says so, or why it could not be done.
+    left out. A `PoiseWarning` reports this, or why it failed.
     """
     known = summary["controllers"].values()
     if not any("walks" in entry and "criterion" not in entry for entry in known):
@@ -50,18 +50,18 @@ def judged_again(
                       PoiseWarning, stacklevel=2)  # fmt: skip
         return summary
     path = folder / TRIALS
-    played: dict[str, Played] = {
+    evaluated: dict[str, Evaluated] = {
         name: [(read_trial(line, path), read_outcome(line, path)) for line in lines
                if line["controller"] == name]
         for name in summary["controllers"]
     }  # fmt: skip
-    entries: dict[str, Entry] = {name: _entry(entry, played[name], plan)
+    entries: dict[str, Entry] = {name: _entry(entry, evaluated[name], plan)
                                  for name, entry in summary["controllers"].items()}  # fmt: skip
     whole: Summary = {
         **summary,
         "controllers": entries,
         "ranking": ranked(entries),
-        "pairs": [pair_figures(p["a"], p["b"], played, entries) for p in summary["pairs"]],
+        "pairs": [pair_figures(p["a"], p["b"], evaluated, entries) for p in summary["pairs"]],
         "seeds": [],
     }
     warnings.warn(f"{folder}: walks of an older result are judged again, J50 and the order by "
@@ -70,7 +70,7 @@ def judged_again(
     return plain(whole)
 
 
-def _entry(before: Entry, played: Played, plan: Plan) -> Entry:
-    entry = controller_entry(played, plan)
+def _entry(before: Entry, evaluated: Evaluated, plan: Plan) -> Entry:
+    entry = controller_entry(evaluated, plan)
     kept = {key: before[key] for key in KEPT if key in before}  # type: ignore[literal-required]
     return {**entry, **kept}  # type: ignore[typeddict-item]

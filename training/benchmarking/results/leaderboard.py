@@ -37,7 +37,7 @@ from .walking_leaderboard import is_of_walks, walking_leaderboard
 
 PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard.md")
 SCENARIO_PAGE = Path("docs/scenarios.md")
-COLUMNS = {"recovered of the mix", *IN_PAIRS, *(each.heading for each in (
+COLUMNS = {"recovered, mix", *IN_PAIRS, *(each.heading for each in (
     J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, NOT_FALLEN, ROOT, TICK))}  # fmt: skip
 SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
 (ETA,) = (each for each in AIMED if each.key == "eta")
@@ -83,7 +83,7 @@ def _summary(path: Path) -> Summary:
 
 
 def leaderboard(summaries: Mapping[str, Summary]) -> str:
-    """The page as Markdown; `summaries` by where they come from."""
+    """Return the page as Markdown; `summaries` by where they come from."""
     summary, origin = merged(summaries)
     (_, first), *later = summaries.items()
     limit = dict(summary["robot"]["ankle_limit"])
@@ -106,7 +106,7 @@ def leaderboard(summaries: Mapping[str, Summary]) -> str:
 
 
 def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
-    """The first result with the rows of later ones; and whose result each row is.
+    """Return the first result with the rows of later ones, and the source of each row.
 
     A controller of a later result takes the place of an earlier one of its name; the reference
     stays that of the first.
@@ -137,7 +137,7 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
 
 
 def _angles(summary: Summary) -> set[float]:
-    """Directions in which the ankle limit is told [deg]."""
+    """Return the directions in which the ankle limit is listed [deg]."""
     return {angle for angle, _ in summary["robot"]["ankle_limit"]}
 
 
@@ -149,7 +149,7 @@ def _shared(angles: set[float], summary: Summary) -> dict[str, object]:
 
 
 def _shape(entry: Entry) -> tuple[list[float], list[int]]:
-    """A controller's directions, and the number of levels of each factor."""
+    """Return a controller's directions, and the number of levels of each factor."""
     angles = [direction["direction"] for direction in entry["directions"]]
     return angles, [len(factor["levels"]) for factor in entry.get("factors", ())]
 
@@ -175,8 +175,8 @@ def _ranking(summary: Summary) -> Table:
 
 
 def _realism(entry: Entry) -> Iterator[tuple[str, str]]:
-    """Heading and cell of each level of realism, the suite's own first: what was recovered of the
-    same pushes, and J50 there."""
+    """Yield heading and cell of each realism level, the suite's own first: the recovered rate of
+    the same pushes, and J50."""
     for factor in entry.get("factors", ()):
         levels = factor["levels"] if factor["factor"] == "realism" else []
         for level in sorted(levels, key=lambda each: not each["standard"]):

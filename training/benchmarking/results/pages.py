@@ -1,4 +1,4 @@
-"""What the pages made of committed files summary.json have in common."""
+"""Helpers of the pages generated from committed files summary.json."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -12,7 +12,7 @@ Table = tuple[Sequence[str], list[list[str]]]  # headings and rows, as `markdown
 
 
 def page_of(template: str, **values: object) -> str:
-    """The Markdown of a template of this room, which knows `table`, `code` and `commit`, too."""
+    """Return the Markdown of a template of this package, with `table`, `code` and `commit`."""
     known = {"table": markdown_table, "code": code, "commit": _commit}
     return markdown_page("poise.training.benchmarking.results", template, **known, **values)
 
@@ -35,7 +35,7 @@ def check_alike(
 
 
 def direction_table(entries: Mapping[str, Entry], names: Iterable[str], figure: Figure) -> Table:
-    """A figure in every direction, of the controllers that were pushed."""
+    """Return a figure in every direction, of the controllers that were pushed."""
     found = {name: {d["direction"]: d for d in entries[name].get("directions", ())}
              for name in names}  # fmt: skip
     angles = sorted({angle for each in found.values() for angle in each})
@@ -48,5 +48,5 @@ def direction_table(entries: Mapping[str, Entry], names: Iterable[str], figure: 
 
 
 def _commit(summary: Summary) -> str:
-    """The commit that a result was played at."""
+    """Return the commit of a result."""
     return code((summary["commit"] or "unknown")[:10])

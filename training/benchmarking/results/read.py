@@ -11,7 +11,7 @@ from poise.configs.reading import is_file, is_folder, read_table
 from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
 from poise.training.benchmarking.diagnosis.words import diagnosis_of, why
 from poise.training.benchmarking.evaluation.folder import Settings, read_settings
-from poise.training.benchmarking.metrics.played import WALK_PUSH
+from poise.training.benchmarking.metrics.evaluated import WALK_PUSH
 from poise.training.benchmarking.trials.table import CASE_COLUMNS, COLUMNS, read_trial
 from poise.training.benchmarking.trials.trial import Trial
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
@@ -40,7 +40,7 @@ class Record:
     fraction: float  #: impulse over the limit of the suite; NaN where it has none
     fall_time: float  #: [s] after the reset; NaN without a fall
     start: float | None  #: of the first push [s]; None without one
-    #: why it was lost, in words; empty of a trial that was recovered, and of older results
+    #: why it was lost, in words; empty for a recovered trial and in older results
     why: str
     line: Mapping[str, str]  #: all columns of trials.csv, as they are written there
 
@@ -76,7 +76,7 @@ class Record:
 
     @cached_property
     def met(self) -> tuple[str, ...]:
-        """Equal for two controllers that met the same: trials of one number may differ."""
+        """Key of the trial's content: trials of one number may differ between controllers."""
         return tuple(self.line.get(name, "") for name in CASE_COLUMNS if name != "controller")
 
 
@@ -109,7 +109,7 @@ class Results:
         return [record for record in self.records if record.controller == controller]
 
     def record(self, controller: str, trial: int) -> Record:
-        """The line of a controller in a trial; raises ConfigError where there is none."""
+        """Return the line of a controller in a trial; raise ConfigError where there is none."""
         if controller not in self.controllers:
             raise ConfigError(f"{shown(controller)} took no part", source=self.folder,
                               field="controller", choices=self.controllers)  # fmt: skip
@@ -120,7 +120,8 @@ class Results:
         return numbers[trial]
 
     def trial(self, record: Record) -> Trial:
-        """The trial of a record, exactly; raises ConfigError where its line does not parse."""
+        """Return the trial of a record, exactly; raise ConfigError where its line does not
+        parse."""
         return read_trial(record.line, self.folder / TRIALS)
 
 
@@ -140,7 +141,7 @@ def load_results(folder: str | Path) -> Results:
     missing = [name for name in (SETTINGS, SUMMARY, TRIALS) if not is_file(folder / name)]
     if missing:
         why = f"holds no finished result: {', '.join(missing)} missing"
-        why += "; the command that began it goes on" if is_file(folder / LOG) else ""
+        why += "; run the command that began it to continue" if is_file(folder / LOG) else ""
         raise ConfigError(why, source=folder)
     settings, summary = read_settings(folder), read_summary(folder / SUMMARY)
     added = settings.controllers.keys() - summary["controllers"].keys()  # not yet finished
@@ -152,8 +153,8 @@ def load_results(folder: str | Path) -> Results:
 
 
 def _records(path: Path) -> tuple[Record, ...]:
-    columns, lines = read_table(path, ": run the same command again, it writes the file anew "
-                                "without playing a trial")  # fmt: skip
+    columns, lines = read_table(path, ": run the same command again, it rewrites the file "
+                                "without running a trial")  # fmt: skip
     lacking = [name for name in COLUMNS if name not in (*columns, *LATER)]
     if lacking:
         raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
@@ -170,18 +171,18 @@ def _record(line: Mapping[str, str], number: int, path: Path) -> Record:
         start = float(line["start"]) if line["start"] else None
         if start is not None and not math.isfinite(start):
             raise ValueError(f"start: must be finite, not {start}")
-        told = why(diagnosis_of(line), fall_time if math.isfinite(fall_time) else None)
-        int(line["seed"])  # a report tells it
+        reason = why(diagnosis_of(line), fall_time if math.isfinite(fall_time) else None)
+        int(line["seed"])  # a report prints it
         return Record(
             int(line["trial"]), line["controller"], recovered, fallen, impulse, direction, duration,
-            fraction, fall_time, start, told, line,
+            fraction, fall_time, start, reason, line,
         )  # fmt: skip
     except (ValueError, KeyError) as error:
         raise ConfigError(f"line {number} does not parse: {error}", source=path) from None
 
 
 def _check(folder: Path, settings: Settings, summary: Summary, records: tuple[Record, ...]) -> None:
-    """The three files must tell of one and the same."""
+    """Raise ConfigError unless the three files belong to one result."""
     entries = summary["controllers"]
     if not entries.keys() <= settings.controllers.keys():
         raise ConfigError(f"its controllers are not those of {SETTINGS}", source=folder / SUMMARY,

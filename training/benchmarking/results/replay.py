@@ -1,4 +1,4 @@
-"""Playing one trial of a result again, exactly, from its folder, and filming it."""
+"""Repeat one trial of a result exactly, from its folder, and film it."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -29,11 +29,11 @@ NARROW = (480, 480)  # [pixels] of one of several
 
 @dataclass(frozen=True)
 class Replay:
-    """A trial played again."""
+    """A repeated trial."""
 
     trial: Trial
-    controller: str  #: who played it
-    outcome: Outcome  #: of now
+    controller: str  #: its name
+    outcome: Outcome  #: of the repetition
     #: column of trials.csv → (recorded, now), for those that differ
     differences: dict[str, tuple[str, str]]
 
@@ -48,7 +48,7 @@ def replay(
     watch: Callable[[BalanceEnv], object] | None = None,
     allow: str | Iterable[str] = (),
 ) -> Replay:
-    """Play a trial of a result again and compare it with what was recorded.
+    """Repeat a trial of a result and compare it with the record.
 
     Args:
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
@@ -57,7 +57,7 @@ def replay(
         video: an MP4 or WebP file to write, see `film`.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
         watch: called with the environment after the reset and after every step.
-        allow: controllers from outside (``module:Class``) that may run.
+        allow: external controllers (``module:Class``) that may run.
 
     Raises:
         ConfigError: no finished result there, no such trial or controller, or a controller or
@@ -102,19 +102,19 @@ def film(
     size: tuple[int, int] | None = None,
     allow: str | Iterable[str] = (),
 ) -> None:
-    """Play a trial of a result again with some controllers and film them side by side.
+    """Repeat a trial of a result with several controllers and film them side by side.
 
     The camera stands beside the first push (`beside`).
 
     Args:
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
-        trial: its number in trials.csv; all of `controllers` have played it.
+        trial: its number in trials.csv, in the results of all `controllers`.
         controllers: names, from left to right.
         path: of the video, ending in .mp4 or .webp.
         fps: frames a second that are wanted [1/s]; None: as of `record`.
         size: width and height of each picture [pixels]; None: as of `record`, but `NARROW` of
             several that are no WebP.
-        allow: controllers from outside (``module:Class``) that may run.
+        allow: external controllers (``module:Class``) that may run.
 
     Raises:
         ConfigError: as `replay`, and for a path or size that is not valid.
@@ -135,7 +135,7 @@ def film(
 
 @contextmanager
 def _opened(folder: str | Path | Results, allow: str | Iterable[str]) -> Iterator[Results]:
-    """What a folder holds; meanwhile the controllers from outside may run that are allowed."""
+    """Open the results of a folder; inside, the allowed external controllers may run."""
     path = folder.folder if isinstance(folder, Results) else Path(folder)
     with allowing(allow, source=path / SETTINGS):
         yield folder if isinstance(folder, Results) else load_results(path)
@@ -151,7 +151,7 @@ def _episode(results: Results, name: str, trial: Trial, size: tuple[int, int]) -
 
 
 def player(results: Results, name: str, trial: Trial) -> Agent:
-    """The controller as it took part, in the conditions of `trial`.
+    """Return the controller as it took part, in the conditions of `trial`.
 
     Raises ConfigError if it or the robot has changed since.
     """

@@ -14,7 +14,7 @@ from poise.training.running.trial_figures import ScenarioFigures
 
 from .pages import Table, check_alike, page_of
 
-WALK = "walk"  # the scenario that only some play
+WALK = "walk"  # the scenario with a command
 Figures = Mapping[str, object]
 
 
@@ -24,7 +24,7 @@ def is_of_scenarios(summary: Summary) -> bool:
 
 
 def scenario_page(summaries: Mapping[str, Summary], page: str) -> str:
-    """The page as Markdown; `summaries` by where they come from, `page` where it is written.
+    """Return the page as Markdown; `summaries` by where they come from, `page` where it is written.
 
     A controller of a later result of a robot and a level takes the place of an earlier one of its
     name. Raises ConfigError for results of another suite or seed, and for controllers of other
@@ -59,7 +59,7 @@ def _table(entries: Mapping[str, Entry], names: list[str]) -> Table:
         pushed: Figures = own.get("push", {})
         repeated: Figures = own.get("repeated", {})
         walked: Figures = own.get(WALK, {})
-        mark = " (took a force from nowhere)" if assisted(entries[name]) else ""
+        mark = " (external force at a soft root)" if assisted(entries[name]) else ""
         rows.append([code(name) + mark, *(scenario_cell(own.get(each)) for each in names),
                      _together(entries[name]), SPEED.text(walked), ENERGY.text(pushed),
                      CHATTER.text(repeated), STEPS_TAKEN.text(pushed)])  # fmt: skip
@@ -67,7 +67,7 @@ def _table(entries: Mapping[str, Entry], names: list[str]) -> Table:
 
 
 def _stood(entry: Entry) -> tuple[int, int]:
-    """Trials without a fall, and all, of those that all controllers play."""
+    """Return the trials without a fall, and all trials, of the scenarios common to all."""
     found: list[ScenarioFigures] = [each for each in entry.get("scenarios", ())
                                     if each["scenario"] != WALK]  # fmt: skip
     kept = (round((each.get("never_fell_rate") or 0.0) * each["trials"]) for each in found)

@@ -26,7 +26,7 @@ def pack_submission(folder: str | Path) -> Path:
     """Check the folder of a result and pack it into ``FOLDER.zip``; returns that file.
 
     The archive holds settings.yaml, trials.csv, summary.json and submission.json, which has the
-    sums (sha256) of these and what was played. Nothing else of the folder goes into it.
+    sums (sha256) of these and the suite. No other file of the folder is included.
 
     Raises:
         ConfigError: as `load_results`; a suite that no leaderboard is of, or not as it is packaged;
@@ -63,7 +63,7 @@ def _check(results: Results) -> None:
         raise ConfigError("no leaderboard is of this suite", source=folder / SETTINGS,
                           field="suite_name", choices=SUITES)  # fmt: skip
     if to_dict(load_suite(settings.suite_name)) != settings.suite:
-        why = f"is not {settings.suite_name} as it is packaged: play it without --trials"
+        why = f"is not {settings.suite_name} as it is packaged: run it without --trials"
         raise ConfigError(why, source=folder / SETTINGS, field="suite")
     for record in results.records:
         if record.error:

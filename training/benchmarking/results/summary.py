@@ -1,4 +1,4 @@
-"""summary.json, read back: anybody may have written it, so all of it is checked first."""
+"""Reading of summary.json, which may come from an untrusted source: all of it is validated."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -18,12 +18,13 @@ ENTRY = (
     ("sectors", "fraction_of", "fraction50"),
 )  # fmt: skip
 LEVEL = (("stood", "unpushed"), ("j50_mean", "j50_mean_ci95"))  # the same, of a level
-LARGEST = 2**53  # whole number, besides seeds: up to here a float holds each
+LARGEST = 2**53  # of whole numbers except seeds: a float represents each up to here
 PAIR = (("both", "only_a", "only_b", "neither", "p_mcnemar"),)  # the same, of a pair
 
 
 def read_summary(path: str | Path) -> Summary:
-    """A summary.json; raises ConfigError, naming the file and the field, where it is not one."""
+    """Return a summary.json; raise ConfigError, naming the file and the field, where it is not
+    one."""
     path = Path(path)
     if not is_file(path):
         raise ConfigError("cannot be read (no such file): not a finished result", source=path)
@@ -51,8 +52,8 @@ def read_summary(path: str | Path) -> Summary:
         for at in entry.get("levels", ()):
             _check_rate(at, path, f"controllers.{name}.levels")
             _check_together(at, LEVEL, path, f"controllers.{name}.levels")
-    told = {tuple(at["level"] for at in entry.get("levels", ())) for entry in entries.values()}
-    if len(told) > 1:
+    levels = {tuple(at["level"] for at in entry.get("levels", ())) for entry in entries.values()}
+    if len(levels) > 1:
         raise ConfigError("must be the same of all controllers", source=path,
                           field="controllers.levels")  # fmt: skip
     for k, pair in enumerate(summary["pairs"]):
@@ -66,7 +67,8 @@ def read_summary(path: str | Path) -> Summary:
 
 
 def _values(data: Any, field: str = "") -> Iterator[tuple[str, object]]:
-    """The texts and whole numbers in plain data, keys among them, each with its dotted field."""
+    """Yield the texts and whole numbers in plain data, keys among them, each with its dotted
+    field."""
     if isinstance(data, dict):
         for key, value in data.items():
             yield field, key
@@ -79,7 +81,7 @@ def _values(data: Any, field: str = "") -> Iterator[tuple[str, object]]:
 
 
 def _check_value(field: str, value: object, path: Path) -> None:
-    """Raise ConfigError for a text that is none to show, and a number that nobody has counted."""
+    """Raise ConfigError for an unprintable text or an implausibly large number."""
     if isinstance(value, str):
         check_shown(value, path, field)
     elif abs(value) > LARGEST and not field.endswith(("seed", "]")):  # type: ignore[arg-type]

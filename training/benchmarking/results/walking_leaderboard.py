@@ -32,7 +32,8 @@ def is_of_walks(summary: Summary) -> bool:
 
 
 def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
-    """The page as Markdown; `summaries` by where they come from, of one suite, seed and robot.
+    """Return the page as Markdown; `summaries` by where they come from, of one suite, seed and
+    robot.
 
     A controller of a later result takes the place of an earlier one of its name. The order is that
     of the mean J50 [N·s], those without one last. Raises ConfigError for results of another suite,
@@ -67,19 +68,19 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         commands={command: _walks(entries, names, command) for command in commands},
         heading=J50.heading,
         directions=direction_table(entries, names, OF_DIRECTION),
-        played=[(summary, [name for name in summary["controllers"] if origin[name] == source])
+        results=[(summary, [name for name in summary["controllers"] if origin[name] == source])
                 for source, summary in summaries.items()],
     )  # fmt: skip
 
 
 def _pushed(entries: Mapping[str, Entry]) -> str:
-    """What J50 is of, in a sentence: the command of the walks, and how long a push takes, as far as
-    the results say it."""
-    told = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
+    """Return a sentence on the pushes of J50: the command of the walks and the duration of a push,
+    as far as the results have them."""
+    commands = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
     known = {name: each["push_duration"] for name, each in entries.items()
              if "push_duration" in each}  # fmt: skip
     text = "J50 is of pushes while it walks" + (
-        f" ({plain(', '.join(sorted(told)))})" if told else ""
+        f" ({plain(', '.join(sorted(commands)))})" if commands else ""
     )
     for duration in sorted(set(known.values())):
         names = [code(name) for name, its in known.items() if its == duration]
@@ -99,8 +100,8 @@ def _order(entry: Entry) -> tuple[bool, bool, float]:
 
 
 def _by_one_verdict(entries: Mapping[str, Entry]) -> dict[str, Entry]:
-    """The entries without the J50 of older results that count walks off their command as lost,
-    where others count falls: the two do not compare."""
+    """Return the entries without the J50 of older results that count walks off their command as
+    lost, where others count falls: the two do not compare."""
     older = {name for name, entry in entries.items() if entry.get("criterion") != NOT_FALLEN}
     if len(older) == len(entries):
         return dict(entries)
@@ -119,12 +120,12 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
         fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)
-        told, minutes = sum(w["recovered"] for w in walks), sum(w["minutes"] for w in walks)
+        followed, minutes = sum(w["recovered"] for w in walks), sum(w["minutes"] for w in walks)
         low, high = poisson_interval(fallen)
         rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
                 if minutes else NONE)  # fmt: skip
         rows.append([str(rank[name] or NONE), code(name), *_j50(entry), *_pushes(entry),
-                     f"{fallen} of {trials}", rate, f"{told} of {trials}"])  # fmt: skip
+                     f"{fallen} of {trials}", rate, f"{followed} of {trials}"])  # fmt: skip
     return head, rows
 
 

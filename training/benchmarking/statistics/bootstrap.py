@@ -110,7 +110,7 @@ def j50_gain(
     resamples: int = 1000,
     seed: int = 0,
 ) -> EnvelopeGain:
-    """Paired gain in J50 of a candidate over a reference that met the same trials.
+    """Return the paired gain in J50 of a candidate over a reference that met the same trials.
 
         (J50_candidate − J50_reference) / J50_reference
 
@@ -143,7 +143,8 @@ def j50_gain(
 
 
 def _gain(j50: ArrayLike, replicates: ArrayLike, freedom: tuple[int, int]) -> Gain:
-    """Gain from J50 of reference and candidate, (2,), and their replicates, (2, resamples)."""
+    """Return the gain from J50 of reference and candidate, (2,), and their replicates, (2,
+    resamples)."""
 
     def relative(pair: ArrayLike) -> np.ndarray:
         one, two = np.asarray(pair)
@@ -159,7 +160,7 @@ def _resample(trials: int, resamples: int, seed: np.random.SeedSequence) -> np.n
 
 
 def _strata(direction: ArrayLike, trials: int) -> tuple[tuple[float, ...], list[np.ndarray]]:
-    """The distinct directions in rising order, and the row numbers of each."""
+    """Return the distinct directions in rising order, and the row numbers of each."""
     angles = np.asarray(direction, dtype=float)
     if angles.shape != (trials,) or not np.all(np.isfinite(angles)):
         raise ValueError(f"direction must be finite, of shape ({trials},), got {angles.shape}")

@@ -7,7 +7,7 @@ import numpy as np
 from .rates import Interval, wilson_interval
 
 Range = Sequence[float]  # (low, high)
-Open = Sequence[float | None] | None  # the same, of which an end may not be known
+Open = Sequence[float | None] | None  # the same, with possibly unknown ends
 
 
 def difference(
@@ -15,7 +15,8 @@ def difference(
 ) -> tuple[float, Interval]:
     """b − a and its interval, from those of a and b [Zou08], "MOVER".
 
-        low  = (b − a) − √((b − b_l)² + (a_u − a)² − 2 ρ (b − b_l)(a_u − a)),   high likewise
+        low  = (b − a) − √((b − b_l)² + (a_u − a)² − 2 ρ (b − b_l)(a_u − a))
+        high = (b − a) + √((b_u − b)² + (a − a_l)² − 2 ρ (b_u − b)(a − a_l))
 
     With Wilson intervals of two proportions this is Newcombe's method 10 [Newcombe98].
 
@@ -39,7 +40,7 @@ def relative_gain(
 ) -> tuple[float, Interval] | tuple[None, None]:
     """b/a − 1 and its interval, from the difference of the logarithms [Zou08].
 
-    None where an end of an interval is not known, or anything is not > 0.
+    None where an end of an interval is unknown or a value is not positive.
     """
     known = [end for end in (*(a_ci or ()), *(b_ci or ())) if end is not None]
     if len(known) < 4 or min(a, b, *known) <= 0.0:
@@ -58,7 +59,8 @@ def ratio(a: float, a_ci: Open, b: float, b_ci: Open) -> tuple[float, Interval] 
 
 
 def paired_rates(both: int, only_a: int, only_b: int, neither: int) -> tuple[float, Interval]:
-    """Difference of two recovered rates on the same trials, b − a, with its 95 % interval.
+    """Return the difference of two recovered rates on the same trials, b − a, with its 95 %
+    interval.
 
     Newcombe's square-and-add interval for paired proportions [Newcombe98b], without a continuity
     correction: `difference` of the Wilson intervals with ρ = φ, the correlation of the 2×2 table.

@@ -3,13 +3,13 @@
 Body sway and recovery time are those of the protocol "Perturbed balance assessment" [BenchBalance],
 the stability margin and the normalisation by size those of "Reaction to impulsive disturbance"
 [Monteleone23]; both are part of the EUROBENCH protocols, github.com/eurobench/eurobench_protocol.
-Where the protocols leave a choice open, it is made here and said.
+Choices that the protocols leave open are documented here.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # loads its parts when they are first asked for: a worker needs none of this
+import scipy  # loads its parts lazily: workers need none of them
 from numpy.typing import ArrayLike
 
 CUTOFF = 10.0  # [Hz] of the second-order Butterworth low-pass
@@ -45,7 +45,7 @@ class Size:
 
 
 def sway_angle(com: ArrayLike, ankles: ArrayLike, direction: ArrayLike) -> np.ndarray:
-    """Angle (n,) [rad] of the line from the ankles to the CoM, from the vertical.
+    """Return the angle (n,) [rad] of the line from the ankles to the CoM, from the vertical.
 
         θ = atan2((c − a)·d, (c − a)·e_z)
 
@@ -62,7 +62,8 @@ def sway_angle(com: ArrayLike, ankles: ArrayLike, direction: ArrayLike) -> np.nd
 
 
 def body_sway(angle: ArrayLike, start: int) -> float:
-    """Largest |θ − θ_rest| [rad] from index `start`, where the push begins and θ_rest is read."""
+    """Return the largest |θ − θ_rest| [rad] from index `start`, where the push begins and θ_rest is
+    read."""
     angle = np.asarray(angle, dtype=float)
     return float(np.max(np.abs(angle[start:] - angle[start])))
 
@@ -82,7 +83,8 @@ def sway_velocity(angle: ArrayLike, rate: float) -> np.ndarray:
 
 
 def recovery_time(angle: ArrayLike, start: int, rate: float) -> float | None:
-    """Seconds from the push until |θ̇| falls below 0.015 rad/s for good; None if it does not.
+    """Return the seconds from the push until |θ̇| falls below 0.015 rad/s for good; None if it does
+    not.
 
     The protocol takes the first moment below; after a push that is where the sway turns, so the
     last moment above counts here. A quiet second must follow.
@@ -94,7 +96,7 @@ def recovery_time(angle: ArrayLike, start: int, rate: float) -> float | None:
 
 
 def stability_margin(levels: ArrayLike, fallen: ArrayLike) -> float | None:
-    """The largest level below which, and at which, fewer than 30 % of ≥ 10 runs fall.
+    """Return the largest level below which, and at which, fewer than 30 % of ≥ 10 runs fall.
 
     The protocol asks for the largest level that the agent withstands. A level beyond one that is
     lost does not count: levels are gone through upwards to the first that is lost.
@@ -136,5 +138,5 @@ def energy_factor(size: Size, reach_of_human: float) -> float:
 
 
 def human_reach(direction: float) -> float:
-    """Half the human's base [m] in a direction [deg]: that of the frontal or the lateral case."""
+    """Return half the human's base [m] in a direction [deg], of the frontal or the lateral case."""
     return HUMAN_DEPTH if abs(np.cos(np.radians(direction))) > np.sqrt(0.5) else HUMAN_WIDTH

@@ -28,7 +28,7 @@ class LogisticFit:
     j50: float  #: impulse recovered with 50 % probability, in the unit of the trials
     j90: float  #: the same with 90 %, J50 − s ln 9: smaller than j50
     scale: float  #: s > 0, in the unit of the trials
-    #: None, or what the data leave open. "lower": all trials were recovered, or the curve passes
+    #: None, or the kind of bound. "lower": all trials were recovered, or the curve passes
     #: one half beyond the largest impulse tried, so that j50 is that largest impulse and the true
     #: J50 is at least about this. "upper": the same at the smallest impulse
     bound: Bound | None
@@ -160,7 +160,8 @@ def _newton(
 
 
 def check_trials(impulse: ArrayLike, recovered: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """The trials as float and bool arrays of shape (n,); raises ValueError as `fit_logistic`."""
+    """Return the trials as float and bool arrays of shape (n,); raise ValueError as
+    `fit_logistic`."""
     impulse = np.asarray(impulse, dtype=float)
     outcome = np.asarray(recovered)
     if impulse.ndim != 1 or impulse.shape != outcome.shape or impulse.size == 0:

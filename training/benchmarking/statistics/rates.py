@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypedDict
 
 import numpy as np
-import scipy  # loads its parts when they are first asked for
+import scipy  # loads its parts lazily
 from numpy.typing import ArrayLike
 
 CONFIDENCE = 0.95  # of every interval
@@ -33,7 +33,7 @@ class SeedFigures(TypedDict):
 
 
 def poisson_interval(count: int) -> Interval:
-    """Garwood's exact interval of the mean of a Poisson distribution that gave `count`.
+    """Return Garwood's exact interval of the mean of a Poisson distribution that gave `count`.
 
         (χ²_{α/2}(2 count) / 2, χ²_{1−α/2}(2 count + 2) / 2),   α = 0.05
 
@@ -50,7 +50,7 @@ def poisson_interval(count: int) -> Interval:
 
 
 def wilson_interval(successes: int, trials: int) -> Interval:
-    """Wilson score interval of a proportion.
+    """Return the Wilson score interval of a proportion.
 
         (p̂ + z²/2n ± z √(p̂(1 − p̂)/n + z²/4n²)) / (1 + z²/n),   p̂ = successes / trials
 
@@ -76,7 +76,8 @@ def wilson_interval(successes: int, trials: int) -> Interval:
 
 
 def mcnemar(only_a: int, only_b: int) -> float:
-    """The p-value of McNemar's test: do two controllers recover equally often on the same trials?
+    """Return the p-value of McNemar's test: do two controllers recover equally often on the same
+    trials?
 
     Only the trials count on which they differ: `only_a` recovered by a alone, `only_b` by b alone.
     If both are equally good, only_a is Binomial(only_a + only_b, ½). The p-value is the exact
@@ -93,7 +94,8 @@ def mcnemar(only_a: int, only_b: int) -> float:
 
 
 def iqm(scores: ArrayLike) -> float:
-    """Interquartile mean [Agarwal21]: mean of the middle half of all scores, whatever the shape.
+    """Return the interquartile mean [Agarwal21]: mean of the middle half of all scores, whatever
+    the shape.
 
     The lowest and the highest ⌊n/4⌋ scores are dropped, so below four scores it is the mean.
 
@@ -106,7 +108,8 @@ def iqm(scores: ArrayLike) -> float:
 def seed_aggregate(
     scores: ArrayLike, *, resamples: int = 2000, seed: int = 0
 ) -> tuple[float, Interval]:
-    """IQM of scores over training seeds, with a stratified percentile bootstrap [Agarwal21].
+    """Return the IQM of scores over training seeds, with a stratified percentile bootstrap
+    [Agarwal21].
 
     Args:
         scores: (seeds, tasks) one score per training seed and task (direction, suite, …), or
@@ -129,7 +132,8 @@ def seed_aggregate(
 
 
 def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
-    """IQM of (seeds, tasks) with its interval, every seed's mean, and the worst of these."""
+    """Return the IQM of (seeds, tasks) with its interval, every seed's mean, and the worst of
+    these."""
     mean, interval = seed_aggregate(scores)
     values = scores.mean(axis=1)
     worst = int(np.argmin(values))
@@ -144,7 +148,7 @@ def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
 
 
 def percentile_interval(replicates: np.ndarray, freedom: tuple[int, int] | None = None) -> Interval:
-    """Percentile bootstrap interval of replicates, shape (resamples,).
+    """Return the percentile bootstrap interval of replicates, shape (resamples,).
 
     Resampling n trials for an estimate with k parameters shows too little spread, by a factor of
     about √((n − k)/n). With `freedom` = (n, k) the percentiles are moved outwards for it and for
@@ -161,12 +165,12 @@ def percentile_interval(replicates: np.ndarray, freedom: tuple[int, int] | None 
 
 
 def eta(j50: ArrayLike, mass: float, limit: ArrayLike) -> np.ndarray:
-    """Return η = (J50 / m) / limit, how near a controller is to the physics of the ankles.
+    """Return η = (J50 / m) / limit, J50 relative to the ankle limit.
 
     Args:
         j50: impulse recovered half the time [N·s], any shape.
         mass: of the robot [kg].
-        limit: impulse per mass that the ankles can hold, ω δ · ωT / (1 − e^(−ωT)) [N·s/kg], of a
+        limit: ankle limit per mass, ω δ · ωT / (1 − e^(−ωT)) [N·s/kg], of a
             shape that broadcasts with j50.
 
     Raises:
@@ -186,6 +190,6 @@ def _finite(scores: ArrayLike) -> np.ndarray:
 
 
 def mean_or_none(values: Sequence[float | None]) -> float | None:
-    """Mean of the values that there are."""
+    """Return the mean of the values other than None, or None without any."""
     found = [value for value in values if value is not None]
     return float(np.mean(found)) if found else None

@@ -1,1 +1,1 @@
-"""Suites choose the trials that controllers play."""
+"""Suites define the trials of controllers."""

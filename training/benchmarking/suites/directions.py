@@ -1,4 +1,4 @@
-"""Parts that ask the same of every direction: the envelope of J50, the grid, and margins."""
+"""Parts that treat all directions alike: the envelope of J50, the grid, and margins."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,12 +19,13 @@ class Envelope(Part):
 
     The first spreads `first_trials` impulses over the whole range, one in each of as many equal
     parts. Its fit gives each controller's rough J50; the second stage spreads `trials` more over
-    J50 · (1 ± spread). A controller plays its own, so that its trials do not depend on who else
-    takes part; `paired`, all controllers play those of all, so that they can be compared in pairs.
+    J50 · (1 ± spread). By default each controller has its own second stage, so its trials do not
+    depend on the other controllers. With `paired` all controllers share all second stages, so they
+    can be compared in pairs.
 
-    With `reach`, the second stage of a controller whose J50 in a direction is only a lower bound
-    after the first goes on from (1 − spread) times that bound up to `reach`, with one trial at it:
-    who recovers from all has then met the largest impulse of all.
+    If J50 in a direction is only a lower bound after the first stage, `reach` extends the second
+    stage from (1 − spread) times that bound up to `reach`, with one trial at `reach`. A controller
+    that recovers from all of them has then met the largest impulse.
     """
 
     directions: int = field(default=16, metadata={"min": 1, "max": 3600})  # evenly around
@@ -75,7 +76,7 @@ class Envelope(Part):
         return [360.0 * k / self.directions for k in range(self.directions)]
 
     def _range(self, draw: Draw, angle: float) -> Range:
-        """Impulses of the first stage [N·s]."""
+        """Return the impulses of the first stage [N·s]."""
         if self.impulses is not None:
             low, high = (draw.robot.mass * j for j in self.impulses)
         else:
@@ -96,7 +97,7 @@ class Envelope(Part):
         yield angle, high, high, 1
 
     def rough(self, first: Sequence[Trial], won: Sequence[bool], angle: float) -> LogisticFit:
-        """The fit of J50 [N·s] to the first stage."""
+        """Return the fit of J50 [N·s] to the first stage."""
         here = [(trial.pushes[0].impulse, each) for trial, each in zip(first, won, strict=True)
                 if trial.pushes[0].direction == angle]  # fmt: skip
         return fit_logistic(*zip(*here, strict=True))

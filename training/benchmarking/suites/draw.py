@@ -1,4 +1,4 @@
-"""Trials are drawn here: every draw depends on the seed and the trial's number alone."""
+"""Sampling of trials, which depends only on the seed and the trial's number."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Conditions, Trial
 
 T = TypeVar("T")
-MOST_TRIALS = 100_000  # all are drawn before the first is played
+MOST_TRIALS = 100_000  # all are sampled before the first one runs
 Recovered = Mapping[str, Sequence[bool]]  # controller → outcome of each trial of the first stage
 
 
@@ -44,7 +44,7 @@ class Standard:
 
 
 class Marks(TypedDict, total=False):
-    """Fields that say which place a trial has in its part, its conditions, and how it walks."""
+    """Optional fields of a trial: its place in its part, its conditions, its walk."""
 
     stage: int
     factor: str | None
@@ -63,7 +63,7 @@ class Draw:
 
     Attributes:
         standard: what the suite's parts share.
-        limits: what pushes are measured by.
+        limits: reference impulses of pushes.
         seed: of the suite.
         bodies: that are pushed; the first one by the standard push.
         motions: name → duration [s] of the motions that are performed.
@@ -85,12 +85,12 @@ class Draw:
             self.bodies = (standard.body, *(b for b in self.bodies if b != standard.body))
 
     def push(self, angle: float, impulse: float) -> Push:
-        """The standard push with an impulse [N·s] towards a direction [deg]."""
+        """Return the standard push with an impulse [N·s] towards a direction [deg]."""
         standard = self.standard
         return Push(self.bodies[0], standard.start, standard.push_duration, impulse, angle)
 
     def trial(self, number: int, pushes: Iterable[Push] = (), **marks: Unpack[Marks]) -> Trial:
-        """A trial with its own seed and its first push over the limit."""
+        """Return a trial with its own seed and its first push over the limit."""
         pushes = tuple(pushes)
         fraction = self.limits.fraction(pushes[0]) if pushes else None
         seed = start_seed(self.seed, number)
@@ -120,11 +120,12 @@ class Draw:
         ]
 
     def height(self, body: str) -> float:
-        """The height of the body's centre of mass, standing, over that of the robot's."""
+        """Return the height of the body's centre of mass, standing, over that of the robot's."""
         return float(self._data.xipos[self.robot.model.body(body).id, 2] / self.robot.height_com)
 
     def point(self, body: str, height: float) -> tuple[float, float, float]:
-        """The point above the body's CoM at a height [of the robot's CoM], in its frame [m]."""
+        """Return the point above the body's CoM at a height [of the robot's CoM], in its frame
+        [m]."""
         axes = self._data.xmat[self.robot.model.body(body).id].reshape(3, 3)
         up = (height - self.height(body)) * self.robot.height_com
         x, y, z = (float(u) for u in axes.T @ [0.0, 0.0, up])
@@ -141,17 +142,16 @@ class Draw:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a suite: trials of one kind. Their `part` is the name that the suite has for it,
-    but where they have one already."""
+    """A part of a suite: trials of one kind. Their `part` is its name in the suite, unless set."""
 
     SIZE: ClassVar[str] = "trials"  # the field that says how many
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        """The trials to begin with, numbered from `number`."""
+        """Return the trials of the first stage, numbered from `number`."""
         raise NotImplementedError
 
     def second_count(self, controllers: int) -> int:
-        """The number of trials that each controller meets in the second stage."""
+        """Return the number of trials of each controller in the second stage."""
         return 0
 
     def second(
@@ -161,16 +161,16 @@ class Part:
         return {}
 
     def resized(self, trials: int) -> Self:
-        """The part with another number of trials, whatever that means for it."""
+        """Return the part with another number of trials (its field `SIZE`)."""
         return replace(self, **{self.SIZE: trials})
 
     def capped(self, trials: int) -> Self:
-        """The part with at most as many trials in every cell."""
+        """Return the part with at most as many trials in every cell."""
         return self.resized(min(getattr(self, self.SIZE), trials))
 
 
 def start_seed(seed: int, number: int) -> int:
-    """The seed of a trial's start, from those of the suite and the trial's number alone."""
+    """Return the seed of a trial's start, from those of the suite and the trial's number alone."""
     return int(np.random.SeedSequence([seed, number, 0]).generate_state(1)[0])
 
 
@@ -180,7 +180,7 @@ def generator(seed: int, number: int) -> np.random.Generator:
 
 
 def repeated(cases: Iterable[T], trials: int, number: int) -> Iterator[tuple[int, T]]:
-    """The number of each trial, from `number` on, and its case; every case has `trials`."""
+    """Return the number of each trial, from `number` on, and its case; every case has `trials`."""
     return enumerate((case for case in cases for _ in range(trials)), number)
 
 

@@ -17,7 +17,7 @@ STANDARD = "standard"  # factor and level of the case that levels are compared w
 
 @dataclass(frozen=True)
 class Levels:
-    """Levels of every factor, besides the standard case's own; none: it is not varied."""
+    """Levels of every factor in addition to that of the standard case; none: it is not varied."""
 
     duration: tuple[float, ...] = field(default=(), metadata={"above": 0.0})  # [s]
     body: bool = False  # every body that the robot's description names
@@ -43,7 +43,7 @@ class Cell:
     count: int = 1
 
     def push(self, draw: Draw, angle: float, fraction: float) -> Push:
-        """A push of a fraction of the ankle limit for its duration."""
+        """Return a push of a fraction of the ankle limit for its duration."""
         duration = draw.standard.push_duration if self.duration is None else self.duration
         push = draw.push(angle, fraction * draw.limits.ankle(angle, duration))
         body = self.body or push.body
@@ -52,7 +52,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Factors(Part):
-    """One factor at a time; every level meets the same starts, directions and fractions."""
+    """One factor at a time; all levels share starts, directions and fractions."""
 
     trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})  # per level
     fractions: Range = field(default=(0.4, 1.0), metadata={"above": 0.0})  # of the ankle limit
@@ -62,7 +62,7 @@ class Factors(Part):
         check_rising(self.fractions, "fractions")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        """Cell by cell, the standard case first; all cells draw alike."""
+        """Return the trials by cell, the standard case first; all cells share random numbers."""
         drawn = draw.stratified(number, self.trials, self.fractions)
         trials: list[Trial] = []
         for cell in self._cells(draw):
@@ -91,7 +91,7 @@ class Factors(Part):
 
 @dataclass(frozen=True)
 class Mix(Part):
-    """All factors drawn at once. Durations are drawn evenly on a logarithmic scale."""
+    """All factors sampled at once, durations evenly on a logarithmic scale."""
 
     trials: int = field(default=160, metadata={"min": 1, "max": MOST_TRIALS})
     fractions: Range = field(default=(0.3, 1.1), metadata={"above": 0.0})
@@ -113,7 +113,7 @@ class Mix(Part):
         return [self._trial(draw, number + k, *where) for k, where in enumerate(drawn)]
 
     def _trial(self, draw: Draw, number: int, angle: float, fraction: float) -> Trial:
-        """The order of the draws is part of the suite."""
+        """Return a random trial; the order of the draws is part of the suite."""
         rng = generator(draw.seed, number)
         duration = float(np.exp(rng.uniform(*np.log(self.duration))))
         body = draw.bodies[int(rng.integers(len(draw.bodies)))]
@@ -133,7 +133,7 @@ class Mix(Part):
 
 
 def repeats_of(push: Push, count: int, draw: Draw) -> list[Push]:
-    """The same push `count` times, the suite's interval from start to start."""
+    """Return the same push `count` times, the suite's interval from start to start."""
     interval = draw.standard.interval
     return [replace(push, start=push.start + k * interval) for k in range(count)]
 

@@ -1,6 +1,6 @@
-"""Parts of pushes that last, and of gusts: several short pushes that come from one side.
+"""Parts of sustained pushes, and of gusts: several short pushes from one side.
 
-Trials of a part with a `command` are walked: side wind, for controllers that walk alone.
+Parts with a `command` need controllers that walk, for example in side wind.
 """
 
 from dataclasses import dataclass, field, replace
@@ -12,7 +12,7 @@ from poise.training.benchmarking.trials.trial import Trial
 
 from .draw import MOST_TRIALS, Draw, Part, generator
 from .random import Sequence, check_forces, sampled
-from .walking import told
+from .walking import commanded
 
 PROFILE_NAMES = {"square": "step", "half-sine": "half-sine"}
 
@@ -42,7 +42,7 @@ class Sustained(Part):
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         bodies = self.bodies(draw)
-        walk = {} if self.command is None else told(self.command)
+        walk = {} if self.command is None else commanded(self.command)
         trials = []
         for here in range(number, number + self.trials):
             pushes = sampled(self.pushes, bodies, draw, generator(draw.seed, here))
@@ -51,16 +51,16 @@ class Sustained(Part):
         return trials
 
     def bodies(self, draw: Draw) -> tuple[str, ...]:
-        """The bodies of which each push draws one."""
+        """Return the bodies from which each push samples one."""
         arms = find_arms(draw.robot) if self.hands else ()
         return (*draw.bodies[:2], *(draw.robot.model.body(arm.hand).name for arm in arms))
 
 
 @dataclass(frozen=True)
 class Gusts(Sequence):
-    """Short pushes one after the other, all within `pushes.spread` of a side that the trial draws.
+    """A sequence of short pushes within `pushes.spread` of a random side of the trial.
 
-    See `Sequence` for what pushes are measured by.
+    See `Sequence` for the units of pushes.
     """
 
     trials: int = field(default=60, metadata={"min": 1, "max": MOST_TRIALS})
@@ -73,5 +73,5 @@ class Gusts(Sequence):
     command: GaitCommand | None = field(default=None, metadata={"omit": "default"})
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        walk = {} if self.command is None else told(self.command)
+        walk = {} if self.command is None else commanded(self.command)
         return [replace(trial, **walk) for trial in super().first(draw, number)]

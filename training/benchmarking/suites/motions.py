@@ -1,4 +1,4 @@
-"""The part of suites in which motions are performed, pushed by shares of the controller's J50."""
+"""The part of performed motions, pushed by shares of the controller's J50."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -30,11 +30,11 @@ def label(name: str) -> str:
 class Motions(Part):
     """Every motion × share of J50 × direction, `trials` times, at a random time of the motion.
 
-    A name is that of a packaged clip, which is put on the robot first, of a packaged motion, or of
-    a file. J50 is the controller's own: that of the file of limits where it is this controller's,
-    else what `standing` finds in the first stage, in which the robot stands. With `of: limits` it
-    is that of the file for all controllers, who then meet the same pushes; nothing is played
-    first. Start, direction and time of a trial are the same for all controllers and shares.
+    A name is that of a packaged clip, which is retargeted to the robot first, of a packaged motion,
+    or of a file. J50 is the controller's own: that of the file of limits if it is of this
+    controller, else that of a first stage in which the robot stands. With `of: limits` it is that
+    of the file for all controllers, so all have the same pushes and no first stage. Start,
+    direction and time of a trial are the same for all controllers and shares.
     """
 
     names: tuple[str, ...] = tuple(f"humanoid_{clip}" for clip in CLIPS)
@@ -56,7 +56,7 @@ class Motions(Part):
             if twice := [value for value, n in Counter(values).items() if n > 1]:
                 raise ValueError(f"{name}: {twice[0]} comes twice")
         if STANDING in self.labels:
-            raise ValueError(f"names: {STANDING} is played by itself")
+            raise ValueError(f"names: {STANDING} is always included")
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -100,7 +100,7 @@ class Motions(Part):
         return LimitTable(tuple(self._standing.angles), tuple(rough))
 
     def _cells(self, draw: Draw, number: int, j50: LimitTable, stage: int = 1) -> list[Trial]:
-        """All trials of the motions; what is drawn goes by motion, direction and repeat alone."""
+        """Return all trials of the motions, seeded by motion, direction and repeat only."""
         trials: list[Trial] = []
         for share, (motion, name) in product(self.shares, enumerate(self.labels)):
             for k in range(self.directions * self.trials):

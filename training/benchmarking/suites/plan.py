@@ -15,7 +15,7 @@ from .factors import standard_levels
 from .scenarios import PART as SCENARIOS
 from .suite import Suite
 
-LEVEL = "@"  # between the name of a part and the level that it is played at again
+LEVEL = "@"  # between the name of a part and the realism level at which it is repeated
 Finished = Mapping[tuple[str, int], Outcome]  # controller, number of the trial → outcome
 
 
@@ -26,8 +26,8 @@ class _Planned(NamedTuple):
     part: Part
     level: str | None  # None: the suite's own
     first: list[Trial]  # of the first stage
-    second: int  # the number that the second stage is drawn by
-    shift: int  # from the numbers that its trials are drawn by to their own
+    second: int  # number that seeds the second stage
+    shift: int  # from the seeding numbers of its trials to their own
 
 
 class Plan:
@@ -35,11 +35,11 @@ class Plan:
 
     Attributes:
         suite: whose trials they are.
-        limits: what pushes are measured by.
+        limits: reference impulses of pushes.
         names: of the controllers.
         motions: name → duration [s] of the motions that are performed.
-        standing: of `names` those that do not walk, and play no scenario in which one does.
-        first: trials of the first stage, which all controllers play but for that.
+        standing: those of `names` that do not walk, and so skip scenarios with a command.
+        first: trials of the first stage, the same for all controllers except these scenarios.
         standard: factor → level of the standard case, as text; empty without factors.
         count: trials of all stages and controllers.
     """
@@ -60,7 +60,7 @@ class Plan:
         self._parts: list[_Planned] = []
         number = 0
         for level in (None, *suite.levels):
-            drawn = 0  # every level draws alike
+            drawn = 0  # all levels share random numbers
             for name, part in suite.parts.items():
                 first = part.first(self._draw, drawn)
                 second = drawn + len(first)
@@ -78,13 +78,13 @@ class Plan:
             check_limbs(load_realism(real), limits.robot)
 
     def plays(self, name: str, trial: Trial) -> bool:
-        """Whether the controller of this name plays a trial of the first stage."""
+        """Return whether the controller of this name runs a trial of the first stage."""
         return name not in self._standing or not trial.commands
 
     def _at(self, name: str, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
-        """The trials of a part at a level; None: the suite's, where they have none of their own.
+        """Return the trials of a part at a level; None: their own level, else the suite's.
 
-        A scenario's own level has the last word in the suite's.
+        A scenario's own level overrides the suite's.
         """
         real = self.suite.realism if level is None else level
         wait, found = self.suite.get_up_time, []
@@ -136,5 +136,5 @@ class Plan:
 
 
 def at_level(part: str, level: str) -> str:
-    """The name of a part that is played again at a level, such as envelope@field."""
+    """Return the name of a part repeated at a realism level, such as envelope@field."""
     return f"{part}{LEVEL}{Path(level).stem}"

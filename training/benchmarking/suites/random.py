@@ -1,7 +1,6 @@
 """Parts of random pushes, of several in a trial, and of none.
 
-A trial depends on the seed and its number alone, so more of them leave the first ones as they
-were.
+A trial depends only on the seed and its number, so adding trials does not change the others.
 """
 
 from dataclasses import dataclass, field, replace
@@ -48,9 +47,9 @@ class Sequence(Part):
 
     `pushes.count` of them at most. The impulse of all but the first is multiplied by a number
     drawn from `later`. Without `bodies` the robot's first push body is pushed; a magnitude in
-    controller_fraction is one of `--limits`, which may be a controller's own, or of what ankles
-    hold where no J50 of the robot was measured. `limit_fraction` is left out: no single push
-    decides a trial.
+    controller_fraction is a fraction of `--limits`, which may be a controller's own, or of the
+    ankle limit if the robot has no measured J50. `limit_fraction` is empty: no single push decides
+    a trial.
     """
 
     trials: int = field(default=50, metadata={"min": 1, "max": MOST_TRIALS})
@@ -89,9 +88,9 @@ class Quiet(Part):
 def sampled(
     sampler: PushSampler, bodies: tuple[str, ...], draw: Draw, rng: np.random.Generator
 ) -> list[Push]:
-    """The pushes of a trial, of `bodies` where the sampler names none.
+    """Return the pushes of a trial, of `bodies` where the sampler names none.
 
-    What is a fraction of J50 is one of the ankle limit where no J50 of the robot was measured.
+    A fraction of J50 is one of the ankle limit if the robot has no measured J50.
     """
     limits = draw.limits
     sampler = replace(sampler, bodies=sampler.bodies or bodies)
@@ -104,8 +103,8 @@ def sampled(
 def one_after_the_other(
     sampler: PushSampler, later: Range, until: float, draw: Draw, number: int
 ) -> tuple[Push, ...]:
-    """The pushes of a trial that begin before `until` [s]; all but the first times a number from
-    `later`. Without `bodies` the robot's first push body is pushed."""
+    """Return the pushes of a trial that begin before `until` [s]; all but the first times a number
+    from `later`. Without `bodies` the robot's first push body is pushed."""
     rng = generator(draw.seed, number)
     first, *rest = sampled(sampler, draw.bodies[:1], draw, rng)
     scaled = [replace(p, impulse=p.impulse * rng.uniform(*later)) for p in rest]

@@ -1,6 +1,7 @@
-"""The part of everyday trials, by name: each with a length, pushes, a walk and a level of its own.
+"""The part of everyday scenarios by name, each with its own duration, pushes, walk and level.
 
-The k-th trial of every scenario has the same seed: those of equal pushes meet the same ones.
+The k-th trial of every scenario has the same seed: scenarios with equal
+settings have the same pushes.
 """
 
 from dataclasses import dataclass, field, replace
@@ -27,7 +28,7 @@ class Scenario:
     trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})
     pushes: PushSampler | None = None
     later: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})  # times all but the first push
-    command: GaitCommand | None = None  # only who walks plays it
+    command: GaitCommand | None = None  # for controllers that walk
     realism: str = IDEAL  # a level or a file of one
 
     def __post_init__(self) -> None:
@@ -36,7 +37,7 @@ class Scenario:
         check_rising(self.later, "later")
 
     def drawn(self, draw: Draw, number: int) -> tuple[Push, ...]:
-        """The pushes of a trial, by a number that all scenarios share."""
+        """Return the pushes of a trial, by a number that all scenarios share."""
         if self.pushes is None:
             return ()
         return one_after_the_other(self.pushes, self.later, self.duration - CALM, draw, number)

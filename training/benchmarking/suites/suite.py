@@ -24,10 +24,10 @@ from .walking import WALKING, Gait, Terrains, Velocity, Walk, WalkKick, WalkPush
 
 @dataclass(frozen=True)
 class Suite(Standard):
-    """A part that is null is left out; the others are played in this order.
+    """A suite; parts that are null are left out, the others run in this order.
 
-    All but `factors` are played again at each of `levels` of realism, names or files: the same
-    starts, directions and pushes; an envelope's second stage is around the J50 there.
+    All parts but `factors` are repeated at each of the realism `levels` (names or files), with the
+    same starts, directions and pushes; an envelope's second stage is around the J50 there.
     """
 
     envelope: Envelope | None = None
@@ -58,7 +58,7 @@ class Suite(Standard):
         if self.walk_push is not None and (self.envelope or self.grid):
             raise ValueError("walk_push: J50 is that of a walk or of standing, not of both")
         if self.motions is not None and len(self.parts) > 1:
-            raise ValueError("motions: must be the only part: what a fall is, depends on them")
+            raise ValueError("motions: must be the only part: they define what a fall is")
         if self.scenarios is not None and (len(self.parts) > 1 or self.levels):
             raise ValueError("scenarios: must be the only part, each of them at its own level")
         if self.scenarios is not None and self.scenarios.duration > self.duration:
@@ -66,7 +66,7 @@ class Suite(Standard):
         stems = [Path(level).stem for level in (self.realism, *self.levels)]
         for stem in stems:
             if stems.count(stem) > 1:
-                raise ValueError(f"levels: {stem} comes twice, besides the suite's own realism")
+                raise ValueError(f"levels: {stem} comes twice, or is also the suite's own realism")
 
     @property
     def parts(self) -> dict[str, Part]:
@@ -76,7 +76,7 @@ class Suite(Standard):
 
     @property
     def paired(self) -> bool:
-        """True if trials depend on who takes part."""
+        """Whether trials depend on the other controllers."""
         return any(part is not None and part.paired for part in (self.envelope, self.walk_push))
 
     @property
@@ -86,14 +86,16 @@ class Suite(Standard):
         return any(name in WALKING for name in self.parts) or any(commanded)
 
     def performing(self, names: Many[str]) -> Suite:
-        """The suite with other motions; raises ConfigError where none is performed."""
+        """Return the suite with other motions; raise ConfigError where none is performed."""
         if self.motions is None:
             raise ConfigError("this suite performs no motions", field="motions")
         return replace(self, motions=replace(self.motions, names=tuple(names)))
 
     def resized(self, trials: int) -> Suite:
-        """The suite with another number of trials in its only part; of several parts, with at most
-        as many in every cell: a direction and stage, a level, the mix."""
+        """Return the suite with another number of trials in its only part.
+
+        With several parts, cap the number in every cell: a direction and stage, a level, `mix`.
+        """
         alone = len(self.parts) == 1
         changed: dict[str, Any] = {
             name: part.resized(trials) if alone else part.capped(trials)
@@ -107,7 +109,7 @@ PARTS = tuple(f.name for f in fields(Suite)
 
 
 def load_suite(name: str | Path) -> Suite:
-    """A packaged suite (`configs/suites`) or a path to one.
+    """Return a packaged suite (`configs/suites`) or a path to one.
 
     Raises ConfigError naming the file, the field and the choices.
     """

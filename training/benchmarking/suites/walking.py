@@ -1,4 +1,4 @@
-"""Parts for controllers that walk: how they follow commands, on what, and what pushes them off.
+"""Parts for controllers that walk: commands, terrains, pushes and kicks.
 
 A trial depends on the seed and its number alone, as in all parts. Pushes and kicks begin at a time
 that goes through the phases of the gait evenly from trial to trial (the golden ratio's fractions),
@@ -27,19 +27,19 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 def from_start(command: GaitCommand) -> TimedCommand:
-    """The command from the reset on."""
+    """Return the command from the reset on."""
     return TimedCommand(**{**asdict(command), "start": 0.0})
 
 
 def command_text(command: GaitCommand) -> str:
-    """The command in words, such as `ahead 0.5, turn 0.25`."""
+    """Return the command in words, such as `ahead 0.5, turn 0.25`."""
     names = [each.name for each in fields(GaitCommand)]
     said = [f"{name} {getattr(command, name):g}" for name in names if getattr(command, name)]
     return ", ".join(said) or "stand"
 
 
-def told(command: GaitCommand) -> dict[str, Any]:
-    """The fields of a trial in which this command holds all the time."""
+def commanded(command: GaitCommand) -> dict[str, Any]:
+    """Return the fields of a trial with this command from start to end."""
     return {"level": command_text(command), "commands": (from_start(command),)}
 
 
@@ -56,12 +56,12 @@ class Walk(Part):
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         each = repeated(self.commands, self.trials, number)
-        return [draw.trial(k, **told(command)) for k, command in each]
+        return [draw.trial(k, **commanded(command)) for k, command in each]
 
 
 @dataclass(frozen=True)
 class Gait(Walk):
-    """The same for commands with step parameters: whether the steps are as told."""
+    """The same for commands with step parameters, which the steps are compared with."""
 
     commands: tuple[GaitCommand, ...] = (GaitCommand(0.5, step_length=0.2),)
 
@@ -98,15 +98,15 @@ class Walking:
     window: float = field(default=12.0, metadata={"min": 0.0})  # some strides
 
     def begins(self, draw: Draw, number: int) -> float:
-        """The start of the push of a trial [s]."""
+        """Return the start of the push of a trial [s]."""
         shift = np.random.default_rng(np.random.SeedSequence([draw.seed, 3])).uniform()
         return float(self.start + (shift + GOLDEN * number) % 1.0 * self.window / draw.robot.omega)
 
     def walking(self, draw: Draw, trials: Iterable[Trial]) -> list[Trial]:
-        """The trials with this command, their only push at its time."""
+        """Return the trials with this command, their only push at its time."""
         return [
             replace(
-                trial, **told(self.command),
+                trial, **commanded(self.command),
                 pushes=tuple(replace(p, start=self.begins(draw, trial.number))
                              for p in trial.pushes),
             )
@@ -116,9 +116,9 @@ class Walking:
 
 @dataclass(frozen=True)
 class WalkPush(Walking, Envelope):
-    """J50 in each of many directions while it walks, as an `Envelope` finds it, at all phases.
+    """J50 of a walk in each of many directions, as in an `Envelope`, over all phases of the gait.
 
-    What counts is not to fall, see `Trial.judged_by_falls`.
+    Trials are judged by falls, see `Trial.judged_by_falls`.
     """
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
@@ -172,7 +172,7 @@ class WalkRepeated(PushSequence):
     command: GaitCommand = field(default_factory=lambda: GaitCommand(0.5))
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        return [replace(trial, **told(self.command)) for trial in super().first(draw, number)]
+        return [replace(trial, **commanded(self.command)) for trial in super().first(draw, number)]
 
 
 #: parts of a suite for controllers that walk

@@ -1,1 +1,1 @@
-"""One trial: who plays it, what pushes are measured by, what became of it."""
+"""One trial: its agent, the reference impulses of pushes, its outcome."""

@@ -1,4 +1,4 @@
-"""Agents are evaluated: a controller by its name, ready to act in its own environment."""
+"""Agents: a controller by its name, ready to act in its own environment."""
 
 import contextlib
 import hashlib
@@ -49,9 +49,9 @@ from .names import NO_CONTROL, check_name
 
 @dataclass(frozen=True, eq=False)
 class Agent:
-    """A name, an environment, and what to do in it."""
+    """A name, an environment, and the actions in it."""
 
-    name: str  #: as the user wrote it
+    name: str  #: as typed by the user
     env: BalanceEnv  #: the environment it acts in
     act: Callable[[np.ndarray], np.ndarray]  #: deterministic action (na,) for an observation (no,)
     fingerprint: str  #: hash of the controller's configuration and the policy's weights
@@ -61,20 +61,20 @@ class Agent:
 
 
 def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
-    """An agent from the name of a controller.
+    """Return an agent from the name of a controller.
 
     Args:
-        name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
+        name: a packaged controller or a path to a ``.yaml`` of one (run with action zero),
             a packaged policy (``residual``), ``zero`` (no torque at all), a folder written by
-            ``poise train``, a policy from outside (an ONNX file, or a folder with a
+            ``poise train``, an external policy (an ONNX file, or a folder with a
             ``deploy.yaml``), ``module:Class`` or ``file.py:Class`` of a controller or a policy, or
             a guard (a packaged one or its ``.yaml``).
-        robot: who is controlled. A policy must have been trained on it.
+        robot: that is controlled. A policy must have been trained on it.
         overrides: arguments of the environment, or fields of its `EnvConfig`.
 
     Raises:
-        ConfigError: no such controller, or one that is not valid or is for another robot; or one
-            from outside that the user has not allowed, see `allowing`.
+        ConfigError: no such controller, or one that is not valid or is for another robot; or
+            an external one that the user has not allowed, see `allowing`.
     """
     check_name(name)
     if name == NO_CONTROL:
@@ -93,8 +93,8 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
 def code_of(name: str) -> list[str]:
     """Return what a command must allow by ``--allow`` to load the agent of this name.
 
-    That is the class from outside or the file of TorchScript that the name, or the file or the
-    folder of this name, leads to. Nothing runs that is not allowed here.
+    That is the external class or TorchScript file to which the name, or the file or folder of this
+    name, refers. Code that is not allowed does not run here.
     """
     if is_plugin(name):
         return [name]
@@ -111,21 +111,21 @@ def code_of(name: str) -> list[str]:
 
 
 def check_walks(name: str, agent: Agent, source: str) -> None:
-    """Raise ConfigError unless the controller of an agent walks; `source` is what asks for it."""
+    """Raise ConfigError unless the controller of an agent walks; `source` requires it."""
     if not can_walk(agent):
         raise does_not_walk(name, source)
 
 
 def can_walk(agent: Agent) -> bool:
-    """Whether the controller of an agent takes commands of a walk."""
+    """Return whether the controller of an agent takes commands of a walk."""
     return isinstance(agent.env, CommandedEnv) and agent.env.command is not None
 
 
 def check_may_walk(name: str, source: str) -> ControllerConfig | None:
-    """The configuration of a controller that is described by a packaged name or a file, or None.
+    """Return the configuration of a controller that is described by a packaged name or a file, or
+    None.
 
-    Raises ConfigError as `check_walks` where that tells that it does not walk: nothing is compiled
-    for it.
+    Raises ConfigError as `check_walks` if that configuration does not walk; nothing is compiled.
     """
     check_name(name)
     described = name in packaged("controllers") or Path(name).suffix in (".yaml", ".yml")
@@ -138,26 +138,27 @@ def check_may_walk(name: str, source: str) -> ControllerConfig | None:
 
 
 def does_not_walk(name: str, source: str) -> ConfigError:
-    """The error of a controller that does not walk where `source` asks for one that does."""
+    """Return the error of a controller that does not walk where `source` requires one that does."""
     return ConfigError(f"the controller {shown(name)} does not walk", source=source,
                        field="controller", choices=walking_controllers())  # fmt: skip
 
 
 def follows_no_motion(name: str, source: str | None = None) -> ConfigError:
-    """The error of a controller that tracks no reference where `source` has a motion performed."""
+    """Return the error of a controller that tracks no reference where `source` has a motion
+    performed."""
     return ConfigError(f"{shown(name)} follows no motion: name a controller that tracks a "
                        "reference, or a policy on one", source=source,
                        field="controller")  # fmt: skip
 
 
 def _stand_in(config: ControllerConfig) -> str:
-    """What takes the place of a controller where state and robot are uncertain, if anything."""
+    """Return the controller that replaces this one at realism levels, or an empty text."""
     other = where_uncertain(config)
     return "" if other is None else to_yaml(other)
 
 
 def _wherever(config: ControllerConfig) -> ControllerConfig:
-    """The same for a policy's files in any folder: their digest tells them apart."""
+    """Return the configuration without the folder of a policy's files, which have a digest."""
     if isinstance(config, PolicyFileConfig):
         return replace(
             config, policy=Path(config.policy).name, described_in="", said=(), origin=None
@@ -166,7 +167,7 @@ def _wherever(config: ControllerConfig) -> ControllerConfig:
 
 
 def _idle(name: str, env: BalanceEnv, content: str) -> Agent:
-    """An agent whose action is always zero."""
+    """Return an agent whose action is always zero."""
     action = np.zeros(len(env.action_names))
     return Agent(name, env, lambda observation: action, _hash(content.encode()))
 
@@ -196,7 +197,7 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
 
 
 def _guarded(name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, object]) -> Agent:
-    """A walker and the recovery policy that takes over from it."""
+    """Return a walker and the recovery policy that takes over from it."""
     from poise.training.learning.policy import load_policy
 
     walker = walker_config(guard, name)
@@ -218,7 +219,7 @@ def _guarded(name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, o
     return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
 
 
-# fields of a training configuration that do not change how its policy plays
+# fields of a training configuration that do not affect its policy's actions
 TRAINING = (
     *("seed", "steps", "threads", "keep_every", "physics_step", "start_from"),
     *("ppo", "curriculum", "evaluation"),
@@ -235,13 +236,13 @@ ENVIRONMENTS = {
 
 
 def _is_controller(name: str, robot: Robot) -> bool:
-    """True if a class, or what a function makes, gives torques."""
+    """Return whether a class, or the object made by a function, is a controller (has `torques`)."""
     found = find_plugin(name)
     return hasattr(found if isinstance(found, type) else make_plugin(name, robot), "torques")
 
 
 def _outside_policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
-    """A policy from outside: `act(observation)` in the environment that it names, or makes."""
+    """Return the agent of an external policy, in the environment that it names or makes."""
     policy = make_plugin(name, robot)
     if not hasattr(policy, "act"):
         raise ConfigError("has neither torques (a controller) nor act (a policy)", source=name)

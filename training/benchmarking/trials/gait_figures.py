@@ -11,12 +11,12 @@ from poise.envs.compiled.maths.runs import runs_of
 
 from .gait_record import WalkArrays, step_error, steps_of
 
-AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
+SWING_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
 SPEED_TOLERANCE, TURN_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad/s] beyond its own error
-FALLING = 1.0  # [s] before a fall, in which strides tell of the fall
+FALLING = 1.0  # [s] before a fall, in which strides are part of the fall
 STOPPED = 1.0  # [s] without a touchdown, after which a robot does not walk any more
-SLOW = 0.1  # [m/s] below which a cost of transport says nothing
+SLOW = 0.1  # [m/s] below which the cost of transport is undefined
 WINDOW = 4  # steps, two strides, by which the end of a walk is judged
 
 
@@ -38,20 +38,20 @@ class Touchdowns(NamedTuple):
 
 
 def touchdowns(record: WalkArrays) -> Touchdowns:
-    """Touchdowns of feet that were in the air for 0.08 s."""
+    """Return touchdowns after a swing of 0.08 s or more."""
     found: list[tuple[int, int]] = []
     for foot in range(record.down.shape[1]):
         for lifted, landed in runs_of(~record.down[:, foot]).tolist():
             if lifted == 0 or landed == len(record.time):  # it has not lifted off, or not landed
                 continue
-            if record.time[landed] - record.time[lifted] >= AIR_TIME - 1e-9:
+            if record.time[landed] - record.time[lifted] >= SWING_TIME - 1e-9:
                 found.append((landed, foot))
     rows = np.array(sorted(found), dtype=int).reshape(-1, 2)
     return Touchdowns(rows[:, 0], rows[:, 1])
 
 
 class Walk:
-    """A recorded walk and the commands that it was to follow.
+    """A recorded walk and its commands.
 
     Velocities are means over a stride, two steps from touchdown to touchdown, of the CoM along the
     mean heading of that stride.
@@ -97,21 +97,21 @@ class Walk:
         ])  # fmt: skip
 
     def mean_yaw(self, first: int, last: int) -> float:
-        """Mean heading from row to row [rad]."""
+        """Return the mean heading from row to row [rad]."""
         return float(np.mean(self.record.yaw[first:last]))
 
     def command_at(self, time: float) -> GaitCommand:
-        """The command that holds at a time [s]."""
+        """Return the command that holds at a time [s]."""
         past = [each for each in self.commands if each.start <= time + 1e-9]
         return past[-1] if past else GaitCommand()
 
     def _changed(self, time: float) -> float:
-        """The start of the command that holds at a time [s]."""
+        """Return the start of the command that holds at a time [s]."""
         return max((each.start for each in self.commands if each.start <= time + 1e-9), default=0.0)
 
     def own_error(self, until: float | None = None) -> TrackingError | None:
-        """The tracking error of the walk itself: the largest over its settled strides i that end
-        before `until` [s] and follow the last command,
+        """Return the tracking error of the walk itself: the largest over its settled strides i that
+        end before `until` [s] and follow the last command,
 
             e_v = max_i |v_i − v*|,   e_ω = max_i |ω_i − ω*|
 
@@ -129,11 +129,11 @@ class Walk:
         return TrackingError(speed, float(np.abs(errors[:, 2]).max()))
 
     def last_error(self) -> TrackingError | None:
-        """The distance of the mean velocity over the last two strides from the command, along their
-        mean heading.
+        """Return the distance of the mean velocity over the last two strides from the command,
+        along their mean heading.
 
-        None where there are no four steps between touchdowns, the last one in the last second: it
-        does not walk any more.
+        None without four steps between touchdowns, the last one in the last second: the walk has
+        stopped.
         """
         rows, r = self.landed.row, self.record
         if len(rows) <= WINDOW or r.time[-1] - r.time[rows[-1]] > STOPPED:
@@ -143,7 +143,8 @@ class Walk:
         return TrackingError(float(np.hypot(*off[:2])), abs(float(off[2])))
 
     def as_commanded(self, own: TrackingError = NO_ERROR) -> bool:
-        """Whether the last two strides are as near to the command as the controller's own strides:
+        """Return whether the last two strides are as near to the command as the controller's own
+        strides:
 
             |v − v*| ≤ e_v + 0.05 m/s,   |ω − ω*| ≤ e_ω + 5 °/s
 
@@ -156,7 +157,7 @@ class Walk:
         return last is not None and near(last, own)
 
     def figures(self) -> dict[str, float | None]:
-        """The figures of an `Outcome`, of the strides and steps that are settled."""
+        """Return the figures of an `Outcome`, of the strides and steps that are settled."""
         velocity, error = self.velocity[self.settled], (self.velocity - self.wanted)[self.settled]
         off, turn = np.linalg.norm(error[:, :2], axis=1), error[:, 2]
         return {
@@ -175,7 +176,7 @@ class Walk:
         }
 
     def _steps(self) -> dict[str, float | None]:
-        """Means of the steps that end settled strides, and their error."""
+        """Return means of the steps that end settled strides, and their error."""
         rows, times = self.landed.row, self.record.time
         ends = np.flatnonzero(self.settled) + 2
         yaws = [self.mean_yaw(rows[k - 2], rows[k]) for k in ends]
@@ -210,7 +211,7 @@ class Walk:
         return {name: float(each) / way for name, each in zip(names, spent, strict=True)}
 
     def _knees(self) -> dict[str, float | None]:
-        """Mean and largest |τ|/m [N·m/kg] of the stance leg's knee on one foot."""
+        """Return the mean and largest |τ|/m [N·m/kg] of the stance leg's knee on one foot."""
         r = self.record
         single = self._known & (r.down.sum(axis=1) == 1)
         load = r.knees[single, np.argmax(r.down[single], axis=1)]
@@ -221,7 +222,7 @@ class Walk:
         }
 
     def _slide(self) -> float | None:
-        """Largest way of a sole on the ground while the other one is in the air [m]."""
+        """Return the largest displacement of a stance sole in single support [m]."""
         r, worst = self.record, 0.0
         for foot in range(r.down.shape[1]):
             alone = self._known & r.down[:, foot] & (r.down.sum(axis=1) == 1)
@@ -231,8 +232,9 @@ class Walk:
         return worst if self._known.any() else None
 
     def _circle_error(self) -> float | None:
-        """Largest distance of the settled walk, averaged over strides, from the circle that is
-        commanded, around the middle that it goes round [m]; None unless one command is a circle.
+        """Return the largest distance of the settled walk, averaged over strides, from the circle
+        that is commanded, around the middle that it goes round [m]; None unless one command is a
+        circle.
 
         The middle c solves |p|² = 2 p · c + k for the walk's points p by least squares.
         """
@@ -248,9 +250,10 @@ class Walk:
         return float(np.max(np.abs(np.linalg.norm(points - middle, axis=1) - radius)))
 
     def phase_at(self, time: float, left: int) -> float | None:
-        """The phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other one.
+        """Return the phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other
+        one.
 
-        Between touchdowns it goes on at the pace of the step before. None before the third one, and
+        Between touchdowns it advances at the pace of the last step. None before the third one, and
         where both feet land at once.
         """
         rows, feet, times = self.landed.row, self.landed.foot, self.record.time
@@ -265,7 +268,7 @@ class Walk:
 
 
 def near(last: TrackingError, own: TrackingError) -> bool:
-    """The inequalities of `Walk.as_commanded`."""
+    """Return whether the inequalities of `Walk.as_commanded` hold."""
     slow, turned = last.speed - own.speed, last.turn - own.turn
     return bool(slow <= SPEED_TOLERANCE and turned <= TURN_TOLERANCE)
 

@@ -28,7 +28,7 @@ class WalkArrays:
 
 
 class WalkRecord:
-    """Keeps what a walk's figures need; hand it to `run_trial`."""
+    """Record the data of a walk's figures; pass it to `run_trial`."""
 
     def __init__(self) -> None:
         self._rows: list[tuple[object, ...]] = []  # one for each field of `WalkArrays`
@@ -54,7 +54,7 @@ class WalkRecord:
 
 
 def knee_motors(env: BalanceEnv) -> list[int | None]:
-    """The motor of each leg's knee, in the order of the soles; None where there is no knee."""
+    """Return the motor of each leg's knee in the order of the soles, None without a knee."""
     dofs = env.simulation.arrays.motor_dofs.tolist()
     knees = [leg.knee for leg in find_legs(env.robot)]
     known = [None if knee is None else env.model.joint(knee).dofadr[0] for knee in knees]
@@ -75,13 +75,14 @@ def steps_of(
     yaws: Sequence[float],
     command_at: Commanded,
 ) -> dict[str, np.ndarray]:
-    """Measures (k,) of the steps that end with the touchdown of a foot at a row, at a heading.
+    """Return measures (k,) of the steps that end with the touchdown of a foot at a row, at a
+    heading.
 
     `step_length` and `step_width` of the sole that lands from the other one, along the heading and
     across it [m]; `swing_time` from lift-off to touchdown [s]; `step_clearance` of the sole's
     middle at its highest above where it lands [m]. `way` and `apart` are from sole to sole when the
     other one lifts off, along the velocity that is commanded and across the heading [m]: feet that
-    land fast go on for a centimetre.
+    land fast slide on for a centimetre.
     """
     measures = [
         _step(record, row, foot, yaw, command_at(record.time[row]))
@@ -107,7 +108,7 @@ def _step(
 
 
 def _apart(r: WalkArrays, row: int, foot: int, yaw: float) -> tuple[float, float]:
-    """The way from the other sole to this one, ahead and to the left [m]."""
+    """Return the way from the other sole to this one, ahead and to the left [m]."""
     x, y = r.feet[row, foot] - r.feet[row, 1 - foot]
     return np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
 
@@ -115,8 +116,8 @@ def _apart(r: WalkArrays, row: int, foot: int, yaw: float) -> tuple[float, float
 def step_error(
     measures: dict[str, np.ndarray], times: Sequence[float], command_at: Commanded
 ) -> float | None:
-    """The largest deviation among the step parameters that are commanded, as a fraction: of the
-    mean of measure/command − 1 over the steps; None where none is commanded."""
+    """Return the largest deviation among the step parameters that are commanded, as a fraction: of
+    the mean of measure/command − 1 over the steps; None where none is commanded."""
     found = []
     for parameter, measure in COMMANDED.items():
         wanted = [getattr(command_at(time), parameter) for time in times]

@@ -1,4 +1,4 @@
-"""Jobs tell a process what to play, and `play` plays it."""
+"""Jobs for worker processes, run by `play`."""
 
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -29,13 +29,13 @@ class Stage:
     #: name and file (or packaged name) of each motion that trials perform; falls are relative to
     #: these then
     motions: tuple[tuple[str, str], ...] = ()
-    tempo: Tempo = field(default_factory=Tempo)  #: at which they are played
+    tempo: Tempo = field(default_factory=Tempo)  #: of the motions
     #: time after a fall in which the robot may get up [s]; None: a fall ends the trial
     get_up: float | None = None
     physics: str = MUJOCO  #: engine that steps the robot, by its name or file
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
-        """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
+        """Return the agent of this name; `robot` if already loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
         duration = self.duration + (self.get_up or 0.0)
         given: dict[str, Any] = {"duration": duration, "pushes": None, "noise": self.noise,
@@ -49,7 +49,7 @@ class Stage:
         return load_agent(controller, robot, **given)
 
     def motion(self, name: str | None, robot: Robot | None = None) -> ReferenceMotion | None:
-        """The motion of this name, which a trial performs, or None. Raises ConfigError."""
+        """Return the motion of this name, or None without a name. Raises ConfigError."""
         if name is None:
             return None
         return load_motion(dict(self.motions)[name], robot or _robot(self.robot))
@@ -65,9 +65,9 @@ class Job:
 
 
 def play(job: Job) -> Outcome:
-    """Play a job; what the controller raises while it plays becomes the outcome's `error`.
+    """Run a job; an exception of the controller in the trial becomes the outcome's `error`.
 
-    Raises PoiseError when the controller cannot be loaded here: that is no trial.
+    Raises PoiseError when the controller cannot be loaded here.
     """
     variants = _loaded(job.stage, job.controller)
     motion = _motion(job.stage, job.trial.motion)
@@ -76,7 +76,7 @@ def play(job: Job) -> Outcome:
         return run_trial(agent, job.trial)
     except MemoryError:  # of this process, not of the controller
         raise
-    except Exception as error:  # a controller from outside may raise anything
+    except Exception as error:  # an external controller may raise anything
         del _variants[job.stage, job.controller]  # it may be broken: the next trial gets a new one
         return failed(error)
 

@@ -1,4 +1,4 @@
-"""Names that a user gives, checked before anything heavy is imported or compiled for them."""
+"""Checks of names from the user, before any slow import or compilation."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +25,7 @@ def check_names(
     realism: str | None = None,
     physics: str | None = None,
 ) -> None:
-    """Raise ConfigError, which lists what there is, for a name of nothing; see `check_name`."""
+    """Raise ConfigError, which lists the choices, for an unknown name; see `check_name`."""
     if motion is not None and Path(motion).suffix == ".npz":  # a robot's motion
         motion = None
     given = {"robots": robot, "suites": suite, "motions": motion, "physics": physics}
@@ -39,9 +39,9 @@ def check_names(
 
 
 def check_name(name: str) -> None:
-    """Raise ConfigError, which lists what there is, unless a controller may be called so.
+    """Raise ConfigError, which lists the choices, unless this may be the name of a controller.
 
-    Nothing is loaded for that, and nothing compiled; what the name stands for may still be wrong.
+    Nothing is loaded or compiled, so the named controller may still be invalid.
     """
     kinds = ("controllers", RIVALS, "policies", GUARDS)
     names = (*(name for kind in kinds for name in packaged(kind)), NO_CONTROL)

@@ -1,4 +1,4 @@
-"""Playing one trial: the outcome depends on the trial and the agent alone, bit for bit."""
+"""Run one trial: its outcome depends bit for bit on the trial and the agent alone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from poise.training.benchmarking.diagnosis.record import CourseRecord, swing_of
 from poise.training.motion.tracking.record import Tracking
 
 from .agents import Agent
-from .gait_figures import AIR_TIME, NO_ERROR, TrackingError, Walk, near
+from .gait_figures import NO_ERROR, SWING_TIME, TrackingError, Walk, near
 from .gait_record import WalkRecord
 from .rising import Rise, Rising
 from .signals import Sway
@@ -33,7 +33,7 @@ Watch = Callable[[BalanceEnv], object]  # called after the reset and after every
 
 
 class SteppedTrial:
-    """A trial that begins when this is made, and goes on step by step.
+    """A trial that begins on construction and is advanced step by step.
 
     Attributes:
         done: whether it has ended, by a fall or by time.
@@ -64,7 +64,7 @@ class SteppedTrial:
         return action
 
     def rise(self, duration: float) -> Rise:
-        """Go on for `duration` [s] with a robot that is down, at most until it is up again."""
+        """Continue for `duration` [s] with a fallen robot, at most until it is up again."""
         env, rising = self._agent.env, Rising(self._agent.env)
         for _ in range(round(duration / env.config.policy_period)):
             if not env.episode.running[0] or rising.held:
@@ -75,7 +75,7 @@ class SteppedTrial:
 
 
 def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
-    """Play a trial to its end in the environment that the agent has."""
+    """Run a trial to its end in the agent's environment."""
     env, stepped = agent.env, SteppedTrial(agent, trial)
     if trial.start is not None:
         return rise_trial(env, trial, stepped, watch)
@@ -114,7 +114,8 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
 def explained(
     env: BalanceEnv, trial: Trial, outcome: Outcome, course: CourseRecord, loss: str
 ) -> Outcome:
-    """The outcome of a lost trial with its diagnosis; `loss` is the criterion without a fall."""
+    """Return the outcome of a lost trial with its diagnosis; `loss` is the criterion without a
+    fall."""
     start = first_start(trial) or 0.0
     return replace(outcome, **asdict(diagnose(env, course.course(), start, loss)))
 
@@ -122,7 +123,8 @@ def explained(
 def rise_trial(
     env: BalanceEnv, trial: Trial, stepped: SteppedTrial, watch: Watch | None
 ) -> Outcome:
-    """The outcome of a trial that starts on the ground: `recovered` is to be up at its end."""
+    """Return the outcome of a trial that starts on the ground: `recovered` is to be up at its
+    end."""
     rising, settled = Rising(env), Settled()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
     while not stepped.done:
@@ -154,11 +156,11 @@ def first_start(trial: Trial) -> float | None:
 
 
 def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
-    """The outcome of a trial with commands, with the figures of its walk.
+    """Return the outcome of a trial with commands, with the figures of its walk.
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
     again, as near to the command as before the push (`Walk.as_commanded`), on a terrain to be
-    beyond its last edge; there is no time of recovery then, and no drift.
+    beyond its last edge; it then has no recovery time and no drift.
     """
     assert isinstance(env, CommandedEnv)  # it has taken the commands
     walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
@@ -192,20 +194,21 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
 
 
 def _errors(whose: str, error: TrackingError | None) -> dict[str, Any]:
-    """The figures of an outcome that say how far a walk is from its command."""
+    """Return the figures of an outcome that say how far a walk is from its command."""
     speed, turn = (None, None) if error is None else map(_finite, error)
     return {f"{whose}_speed_error": speed, f"{whose}_turn_error": turn}
 
 
 def left_command(trial: Trial, outcome: Outcome) -> bool:
-    """Whether a walk was pushed, did not fall, and goes on otherwise than commanded."""
+    """Return whether a pushed walk did not fall but does not follow its command."""
     pushed = first_start(trial) is not None
     return pushed and outcome.last_speed_error is not None and not outcome.recovered
 
 
 def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
-    """The outcome of a walk that had no settled stride before its push: it is compared with the
-    same trial without the push, which is played for that.
+    """Return the outcome of a walk without a settled stride before its push.
+
+    It is compared with the same trial without the push, which runs in addition.
     """
     assert outcome.last_speed_error is not None and outcome.last_turn_error is not None
     last = TrackingError(outcome.last_speed_error, outcome.last_turn_error)
@@ -224,7 +227,7 @@ def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
 
 
 def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
-    """The outcome of a trial that performs a motion: `recovered` is to have not fallen."""
+    """Return the outcome of a trial that performs a motion: `recovered` is to have not fallen."""
     figures: dict[str, Any] = {
         name: _finite(value) for name, value in asdict(tracking.figures()).items()
     }
@@ -236,7 +239,7 @@ def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
 
 
 def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -> Outcome:
-    """The outcome that the environment has recorded."""
+    """Return the outcome recorded by the environment."""
     m = env.episode.metrics
     recovered = env.recovered and not env.fallen
     pushed = max((push.start for push in trial.pushes), default=0.0)
@@ -270,19 +273,19 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
 
 
 def drawn_robot(env: BalanceEnv) -> str | None:
-    """What the episode's robot was drawn as, as JSON; None where it is the one that is known."""
+    """Return the parameters of the episode's randomised robot as JSON; None without any."""
     return None if env.drawn is None else json.dumps(env.drawn.summary(env.arrays.timestep))
 
 
 def surfaces_passed(env: BalanceEnv) -> int | None:
-    """The surfaces of the terrain, without the start's, of which the CoM has passed the beginning;
-    None on level ground."""
+    """Return the surfaces of the terrain, without the start's, of which the CoM has passed the
+    beginning; None on level ground."""
     surfaces, com = env.simulation.robot.terrain.surfaces(), env.simulation.state.com
     return sum(bool(com[0] > each.x_min) for each in surfaces[1:]) if surfaces else None
 
 
 def lean(env: BalanceEnv) -> float:
-    """The tilt of the root from the standing posture, whatever the yaw [°]."""
+    """Return the tilt of the root from the standing posture [°], independent of yaw."""
     standing = env.simulation.arrays.root_standing[2]
     cosine = float(env.simulation.state.root_axes[2] @ standing)
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
@@ -321,9 +324,9 @@ def _finite(value: float) -> float | None:
 
 
 class Touchdowns:
-    """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
+    """Count touchdowns after a swing of at least `SWING_TIME`.
 
-    Where the controller has a plan, those alone that it planned: a foot that it swung meanwhile.
+    Where the controller has a plan, only its planned steps count.
 
     Args:
         feet: number of feet.
@@ -332,8 +335,8 @@ class Touchdowns:
 
     def __init__(self, feet: int, period: float):
         self.count = 0
-        self._least = max(round(AIR_TIME / period), 1)
-        self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
+        self._least = max(round(SWING_TIME / period), 1)
+        self._swing = np.zeros(feet, dtype=int)  # updates in a row without contact
         self._planned = np.zeros(feet, dtype=bool)  # whether the foot swung by plan in these
 
     def update(self, contacts: np.ndarray, swinging: int | None = None) -> None:
@@ -341,6 +344,6 @@ class Touchdowns:
         down = contacts > 0.5
         swung = swinging is None or np.arange(len(down)) == swinging
         self._planned |= ~down & swung
-        self.count += int(np.sum(down & self._planned & (self._air >= self._least)))
+        self.count += int(np.sum(down & self._planned & (self._swing >= self._least)))
         self._planned &= ~down
-        self._air = np.where(down, 0, self._air + 1)
+        self._swing = np.where(down, 0, self._swing + 1)

@@ -1,4 +1,4 @@
-"""The size of a push for a robot: over what its ankles hold, and over what its baseline holds."""
+"""The size of a push relative to a robot's ankle limit and to its baseline's J50."""
 
 import shlex
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ class PushLimits:
         return self.standing.support_margin(direction)
 
     def around(self, spacing: float) -> np.ndarray:
-        """Directions (n,) [deg] from 0 to below 360, every `spacing` and at every corner.
+        """Return directions (n,) [deg] from 0 to below 360, every `spacing` and at every corner.
 
         A corner is one of the standing support polygon, seen from the CoM: δ(θ) has its peaks
         there, which a line through evenly spaced directions would cut off.
@@ -62,14 +62,14 @@ class PushLimits:
         return np.union1d(np.arange(0.0, 360.0, spacing), np.degrees(angles) % 360.0)
 
     def j50(self) -> LimitTable:
-        """The table; raises ConfigError where none was measured."""
+        """Return the table; raise ConfigError where none was measured."""
         if self.table is None:
             raise ConfigError(f"no J50 of {self.robot.name!r} was measured", field="share",
                               choices=packaged("limits"))  # fmt: skip
         return self.table
 
     def ankle(self, direction: float, duration: float) -> float:
-        """Impulse J [N·s] of a square push that the ankles alone hold."""
+        """Return the ankle limit: the largest impulse J [N·s] of a square push."""
         return self.robot.mass * ankle_limit(self.omega, self.margin(direction), duration)
 
     def fraction(self, push: Push) -> float:
@@ -83,7 +83,8 @@ class PushLimits:
 
 
 def load_limits(robot: Robot, name: str | Path | None = None) -> PushLimits:
-    """The limits in a packaged file or a path; None: the file of the robot's name, if there is one.
+    """Return the limits in a packaged file or a path; None: the file of the robot's name, if there
+    is one.
 
     Raises:
         ConfigError: no such file, one that is not valid, or one measured for another robot.

@@ -1,4 +1,4 @@
-"""Getting up: whether and when a robot that lies on the ground stands again."""
+"""Getting up: whether and when a robot on the ground stands again."""
 
 from dataclasses import dataclass
 
@@ -27,8 +27,8 @@ class Rise:
 
 
 def is_up(env: BalanceEnv) -> bool:
-    """Whether the robot is on its feet alone: the root within 30° of standing, the CoM at 0.8 of
-    its standing height or higher, nothing but the feet on the ground."""
+    """Return whether the robot is on its feet alone: the root within 30° of standing, the CoM at
+    0.8 of its standing height or higher, nothing but the feet on the ground."""
     s = env.simulation.state_arrays
     high = s.com[2] >= UP_HEIGHT * env.robot.height_com
     return bool(
@@ -45,7 +45,7 @@ class Rising:
         self._first: float | None = None
 
     def update(self) -> None:
-        """Look at the robot as it is now."""
+        """Update from the robot's current state."""
         now = self._env.simulation.time
         if not is_up(self._env):
             self._since = None
@@ -61,5 +61,5 @@ class Rising:
         return since is not None and self._env.simulation.time - since >= HELD - 1e-9
 
     def outcome(self) -> Rise:
-        """Of all that was looked at."""
+        """Return the outcome so far."""
         return Rise(self.held, None if self._first is None else self._first - self._begin)

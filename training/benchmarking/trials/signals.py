@@ -9,7 +9,7 @@ from poise.training.benchmarking.statistics.eurobench import body_sway, recovery
 
 
 class Signals:
-    """Keeps the signals of a trial, in the heading frame of its start; hand it to `run_trial`.
+    """Record the signals of a trial in the heading frame; pass it to `run_trial`.
 
     After the trial, `t` is the time (n,) [s] and `columns` has
 
@@ -55,7 +55,7 @@ class Signals:
 
 
 class Sway:
-    """Keeps CoM and ankles at every policy step; hand it to `run_trial`."""
+    """Record CoM and ankles at every policy step; pass it to `run_trial`."""
 
     def __init__(self) -> None:
         self._rows: list[tuple[np.ndarray, np.ndarray]] = []
@@ -68,7 +68,8 @@ class Sway:
         self._rows.append((state.com.copy(), _ankles(env.simulation)))
 
     def of(self, push: Push, period: float) -> tuple[float, float | None]:
-        """Body sway [rad] and recovery time [s] in the plane of a push, at rows `period` apart."""
+        """Return the body sway [rad] and recovery time [s] in the plane of a push, at rows `period`
+        apart."""
         angle, start = self.angle(push.direction), round(push.start / period)
         return body_sway(angle, start), recovery_time(angle, start, 1.0 / period)
 

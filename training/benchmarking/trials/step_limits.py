@@ -30,7 +30,7 @@ class NStepLimit:
 
     In each direction: r is how far the CoP can be brought from the CoM, by both soles with the
     torques of their ankles; l how far a foot gets in one step of the shortest time T_s, by
-    `steps`. An upper bound: it knows neither legs that must not cross nor the CoM's height.
+    `steps`. An upper bound: it ignores collisions of the legs and the CoM's height.
     """
 
     def __init__(self, limits: PushLimits, steps: StepLimits | None = None):
@@ -85,7 +85,7 @@ class NStepLimit:
 def stepping_limits(
     agents: Iterable[Agent], outcomes: Mapping[str, Sequence[Outcome]], limits: PushLimits
 ) -> dict[str, NStepLimit]:
-    """The N-step limit of every controller that steps, by what its planner allows.
+    """Return the N-step limit of every controller that steps, by what its planner allows.
 
     Those without a planner come last. They count as controllers that step if they did in more than
     a tenth of their recoveries; the defaults of `StepLimits` then stand for their own. A foot that
@@ -113,7 +113,7 @@ def _own_limits(agent: Agent) -> StepLimits | None:
 
 
 def groups(steps: Mapping[str, NStepLimit]) -> dict[StepLimits, list[str]]:
-    """The controllers that have the same limits of a step."""
+    """Return step limits → controllers with these limits."""
     found: dict[StepLimits, list[str]] = {}
     for name, limit in steps.items():
         found.setdefault(limit.steps, []).append(name)
@@ -141,12 +141,12 @@ def curves(steps: Mapping[str, NStepLimit], duration: float) -> list[StepCurves]
 
 
 def line_name(name: str, whose: Sequence[Sequence[str]]) -> str:
-    """The name of a line of a plot; it says whose it is where not all that step are alike."""
+    """Return the name of a line of a plot, with its controller where step limits differ."""
     return DRAWN[name] + (f" of {whose[0][0]}" if len(whose) > 1 else "")
 
 
 def shown_out_to(top: float, limits: Iterable[float]) -> float:
-    """The reach of a plot that shows values up to `top`, and limits as far as there is room."""
+    """Return the range of a plot that shows values up to `top`, and limits within `ROOM`."""
     return max(top, min(max(limits, default=0.0), ROOM * top))
 
 

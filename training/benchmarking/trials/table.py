@@ -1,4 +1,4 @@
-"""Trials and outcomes as lines of trials.csv: what is written reads back exactly."""
+"""Trials and outcomes as lines of trials.csv, which are read back exactly."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -31,12 +31,12 @@ OUTCOME_COLUMNS = tuple(
 COLUMNS = (*CASE_COLUMNS, *OUTCOME_COLUMNS)
 TEXTS = ("controller", "part", "factor", "level", "body", "profile", "realism", "motion")
 WHOLE = ("trial", "seed", "stage", "start_posture")
-FULL = ("trial", "seed", "stage", "delay", "mass_error")  # columns without empty cells
+REQUIRED = ("trial", "seed", "stage", "delay", "mass_error")  # columns without empty cells
 AS_JSON = ("later", "commands", "kicks", "terrain")  # of all other columns a cell is a number
 
 
 def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell]:
-    """The line of a trial and a controller.
+    """Return the line of a trial and a controller.
 
     `later` has the pushes after the first as JSON, `commands` and `kicks` all of these, `terrain`
     its fields.
@@ -57,17 +57,17 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
 
 
 def _many(items: Sequence[Any]) -> str | None:
-    told = [{k: v for k, v in asdict(item).items() if v is not None} for item in items]
-    return json.dumps(told) if told else None
+    fields = [{k: v for k, v in asdict(item).items() if v is not None} for item in items]
+    return json.dumps(fields) if fields else None
 
 
 def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
-    """The columns of an outcome."""
+    """Return the columns of an outcome."""
     return dict(zip(OUTCOME_COLUMNS, asdict(outcome).values(), strict=True))
 
 
 def read_outcome(line: Mapping[str, str], path: Path) -> Outcome:
-    """The outcome of a line; raises ConfigError where it does not parse. A column that older
+    """Return the outcome of a line; raise ConfigError where it does not parse. A column that older
     results lack is a field's default, and so is an empty cell."""
     cells: dict[str, Any] = {}
     for column, (name, hint) in zip(OUTCOME_COLUMNS, get_type_hints(Outcome).items(), strict=True):
@@ -101,10 +101,13 @@ def _push_cells(push: Push | None) -> dict[str, Cell]:
 
 
 def read_trial(line: Mapping[str, str], path: Path) -> Trial:
-    """The trial of a line; raises ConfigError where it does not parse. A column that older results
-    lack is a field's default, and so is an empty cell, but for those of `FULL` and of a push."""
+    """Return the trial of a line; raise ConfigError where it does not parse.
+
+    A missing column of older results or an empty cell is the field's default, except for
+    `REQUIRED` and the columns of a push.
+    """
     try:
-        for name in (*FULL, *(PUSH_COLUMNS if line["body"] else ())):
+        for name in (*REQUIRED, *(PUSH_COLUMNS if line["body"] else ())):
             if not line[name]:
                 raise ValueError(f"{name} is empty")
         cells = {name: _read(name, line[name]) for name in CASE_COLUMNS if line.get(name)}

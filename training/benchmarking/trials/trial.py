@@ -1,4 +1,4 @@
-"""One trial: a start, the pushes, the conditions that they meet, and what became of it."""
+"""One trial: its start, pushes and conditions, and its outcome."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,27 +12,27 @@ from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis
 
 @dataclass(frozen=True)
 class Conditions:
-    """The difference of a trial's robot from the one that its controller knows."""
+    """The difference of a trial's robot from its controller's model."""
 
     friction: float | None = None  #: of floor and soles; None: the robot's own
     delay: float = 0.0  #: of the sensors [s]
-    mass_error: float = 0.0  #: by which all masses differ from those that the controller knows
+    mass_error: float = 0.0  #: relative error of all masses in the controller's model
     velocity_noise: float = 0.0  #: standard deviation of measured joint velocities [rad/s]
-    #: name or file of a level, in which the other fields have the last word; None: ideal
+    #: name or file of a realism level, which the other fields override; None: ideal
     realism: str | None = None
 
 
-STANDARD_CONDITIONS = Conditions()  # the robot as its controller knows it
+STANDARD_CONDITIONS = Conditions()  # the robot as its controller models it
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial that controllers meet alike."""
+    """A trial, the same for all controllers."""
 
     number: int  #: within its suite
     seed: int  #: of the disturbed start
     pushes: tuple[Push, ...] = ()  #: one after the other; none where the robot only stands
-    conditions: Conditions = STANDARD_CONDITIONS  #: in which it is played
+    conditions: Conditions = STANDARD_CONDITIONS  #: of robot, ground and sensors
     #: impulse of the only push over its limit (see `PushLimits.scale`), of repeated ones of each
     limit_fraction: float | None = None
     part: str = ""  #: of the suite
@@ -40,13 +40,13 @@ class Trial:
     #: which factor it varies; "standard" for the case that others are compared with
     factor: str | None = None
     level: str | None = None  #: the factor's value, as text
-    #: that a controller that walks follows, in the order of time; none: it stands
+    #: of a walk, in order of time; empty: the robot stands
     commands: tuple[TimedCommand, ...] = ()
     kicks: tuple[Kick, ...] = ()  #: sudden changes of the root's velocity
-    terrain: Terrain | None = None  #: that it is played on; None: that of the environment
-    #: that is performed, by its name in the suite; None: that of the environment
+    terrain: Terrain | None = None  #: None: that of the environment
+    #: reference motion by its name in the suite; None: that of the environment
     motion: str | None = None
-    share: float | None = None  #: of the controller's J50 that the push is
+    share: float | None = None  #: impulse of the push over the controller's J50
     until: float | None = None  #: when it ends [s]; None: when those of its suite do
     #: number of the posture on the ground that it starts from; None: it starts on its feet
     start: int | None = None
@@ -64,7 +64,7 @@ class Trial:
 
     @property
     def judged_by_falls(self) -> bool:
-        """Whether it is won by not falling: a walk, but for one that is to get across a terrain."""
+        """Whether it is won by not falling: a walk on level ground."""
         return bool(self.commands) and self.terrain is None
 
     @property
@@ -78,11 +78,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialFigures:
-    """The figures of a trial. Distances [m], times [s]; None where there is no such value, or
-    where a simulation has blown up.
+    """The figures of a trial. Distances [m], times [s]; None without such a value, or
+    where the simulation has diverged.
 
-    Of a walk the strides count, two steps each, that begin 4 s or more after the last change of the
-    command and end a second or more before a fall, and the steps that end them.
+    Of a walk only strides (two steps) count that begin at least 4 s after the last change of the
+    command and end at least 1 s before a fall, and the steps that end them.
     """
 
     #: upright, quiet and with feet at rest for the last second; of a walk that goes on, not fallen,
@@ -96,8 +96,8 @@ class TrialFigures:
     recovery_time: float | None = None
     #: a foot moved more than 5 cm; the column `stepped` of trials.csv
     foot_displaced: bool = False
-    #: touchdowns of feet that were in the air for 0.08 s; of a controller that plans its steps, or
-    #: keeps its feet where they are, those that it planned
+    #: touchdowns after a swing of 0.08 s or more; of a controller that plans its steps, or keeps
+    #: its feet fixed, only planned ones
     steps: int = 0
     max_com: float | None = None  #: largest distance of the CoM from the soles' centre
     max_capture: float | None = None  #: the same of the capture point
@@ -106,10 +106,10 @@ class TrialFigures:
     energy: float | None = None  #: ∫ Σ |τ q̇| dt [J]
     peak_torque: float | None = None  #: largest |τ| over its limit
     saturation: float = 0.0  #: fraction of motors and ticks at the limit
-    mean_power: float | None = None  #: ∫ Σ |τ q̇| dt over the time that was played [W]
-    #: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors, over the time that
-    #: was played [1/s]. A torque that goes from one limit to the other and back once a second has
-    #: 4; one that hums has more
+    mean_power: float | None = None  #: ∫ Σ |τ q̇| dt over the duration of the trial [W]
+    #: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors, over the duration of
+    #: the trial [1/s]. A torque that goes from one limit to the other and back once a second has
+    #: 4; chattering torques have more
     torque_variation: float | None = None
     solver_failures: int = 0  #: ticks at which the QP was not solved
     mean_abs_action: float | None = None  #: mean |action| after the first second
@@ -119,7 +119,7 @@ class TrialFigures:
     foot_drift: float | None = None  #: the same of a sole
     final_speed: float | None = None  #: |ċ| at the end [m/s]
     final_lean: float | None = None  #: of the root from the described posture at the end [°]
-    #: largest force [N] that a soft root took from nowhere; 0 with a hard root
+    #: largest external force [N] of a soft root; 0 with a hard root
     root_force: float | None = None
     #: body sway [rad] of a recovered push, see `training/benchmarking/statistics/eurobench.py`
     sway: float | None = None
@@ -149,21 +149,21 @@ class TrialFigures:
     #: mean |τ|/m of the stance leg's knee on one foot, at the ends of policy steps [N·m/kg]
     knee_mean: float | None = None
     knee_peak: float | None = None  #: the largest
-    #: of one command that is a circle, largest distance of the walk from it, around the middle that
-    #: the walk goes round
+    #: of a single circular command, largest distance of the walk from that circle around the walk's
+    #: own centre
     circle_error: float | None = None
-    foot_slide: float | None = None  #: largest way of a sole that bears the robot alone
+    foot_slide: float | None = None  #: largest displacement of a sole in single support
     #: phase of the stride at the start of the first push or kick: 0 where the left foot lands, 0.5
     #: where the right one does
     push_phase: float | None = None
-    #: largest distance of a stride's velocity from the command before the first push or kick, else
-    #: without it, see `Walk.own_error` [m/s]; of a walk that is pushed
+    #: of a pushed walk, largest error of a stride's velocity before the first push or kick, else
+    #: without it, see `Walk.own_error` [m/s]
     own_speed_error: float | None = None
     own_turn_error: float | None = None  #: the same of the turn rate [rad/s]
     #: distance of the last two strides' mean velocity from the command [m/s]; None after a fall
     last_speed_error: float | None = None
     last_turn_error: float | None = None  #: the same of the turn rate [rad/s]
-    edge_contacts: int = 0  #: times that a foot came to touch an edge of the terrain
+    edge_contacts: int = 0  #: new contacts of a foot with an edge of the terrain
     #: of a terrain, of which the CoM has passed the beginning; stairs climbed
     surfaces_passed: int | None = None
     #: from here to `interruptions`: of a motion that is performed, see `TrackingFigures`
@@ -182,9 +182,9 @@ class TrialFigures:
     #: root within 30° of standing, the CoM at 0.8 of its height, only the feet on the ground
     up_again: bool | None = None
     up_time: float | None = None  #: from the fall, or the start on the ground, until it was up
-    #: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`
+    #: parameters of a randomised robot as JSON, see `DrawnRobot.summary`
     drawn: str | None = None
-    #: what the controller raised, on one line; the trial then counts as not recovered
+    #: exception of the controller on one line; the trial then counts as not recovered
     error: str | None = None
 
     @property
@@ -195,18 +195,18 @@ class TrialFigures:
 
 @dataclass(frozen=True)
 class Outcome(Diagnosis, TrialFigures):
-    """The outcome of a trial: its figures, then why it was lost, of which a recovered one has none.
+    """The outcome of a trial: its figures and, if it was lost, the diagnosis.
 
     Bases are listed from the last field to the first, as dataclasses collect them.
     """
 
 
 def won(trial: Trial, outcome: Outcome) -> bool:
-    """What J50, rankings and pairs count: of a walk on level ground not to have fallen, of all else
-    to have recovered."""
+    """Return whether a trial counts as won in J50, rankings and pairs: a walk on level ground
+    without a fall, any other trial recovered."""
     return outcome.upright if trial.judged_by_falls else outcome.recovered
 
 
 def failed(error: Exception) -> Outcome:
-    """The outcome of a trial in which the controller raised."""
+    """Return the outcome of a trial in which the controller raised."""
     return Outcome(recovered=False, fallen=False, error=raised(error), loss="error")

@@ -1,4 +1,4 @@
-"""An agent in the standard conditions, and in others."""
+"""Agents under standard and other conditions."""
 
 from functools import cache
 from typing import Any
@@ -16,9 +16,9 @@ from .trial import Conditions
 
 @cache
 def level_of(conditions: Conditions) -> Realism:
-    """The level of realism that conditions are: their own, with the single factors in it.
+    """Return the realism level of conditions: the named one, overridden by the single factors.
 
-    Raises ConfigError for a level that does not exist.
+    Raises ConfigError for an unknown level.
     """
     level = load_realism(conditions.realism)
     changed: dict[str, dict[str, Any]] = {}
@@ -34,9 +34,9 @@ def level_of(conditions: Conditions) -> Realism:
 
 
 class AgentVariants:
-    """One agent under several conditions, whose environment is the same in all of them.
+    """One agent under several conditions, in one environment.
 
-    The realism of the environment is that of the conditions, whatever it was before.
+    The environment's realism is set by the conditions.
     """
 
     def __init__(self, agent: Agent):
@@ -53,8 +53,8 @@ class AgentVariants:
     ) -> Agent:
         """Return the agent, whose environment has these conditions from its next reset on.
 
-        `terrain` and `motion` take the place of the environment's own. Raises ConfigError for a
-        level of realism that does not exist.
+        `terrain` and `motion` replace those of the environment. Raises ConfigError for an unknown
+        realism level.
         """
         env = self.agent.env
         motion = motion or self._motion

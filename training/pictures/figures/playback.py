@@ -21,7 +21,7 @@ from .encoder import encoded
 from .palette import ORANGE
 
 RATE = 25.0  # [1/s] of the frames
-BESIDE = 1.0  # to the robot's left, over the CoM height
+PADDING = 1.0  # to the robot's left, over the CoM height
 BONE, HEAD = 0.022, 0.03  # radii over the CoM height
 MOST_GEOMS = 2_000
 STILL = 0.3  # [m] by which what is looked at may move before the camera follows
@@ -46,7 +46,7 @@ class SkeletonMarks:
     ):  # fmt: skip
         self.begins, self.size = begins, robot.height_com
         self.clip = clip.turned(-(float(clip.facing()[0]) if heading is None else heading))
-        place = np.append(robot.standing_qpos[:2] + [0.0, BESIDE * self.size], 0.0)
+        place = np.append(robot.standing_qpos[:2] + [0.0, PADDING * self.size], 0.0)
         places = scale * self.clip.places()
         places -= places[0, 0] * [1.0, 1.0, 0.0] + [0.0, 0.0, float(places[..., 2].min())]
         way = (places[:, :1] - places[0, 0]) * [1.0, 1.0, 0.0]

@@ -7,7 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from poise.training.benchmarking.evaluation.tables import walked
-from poise.training.benchmarking.metrics.played import DIRECTIONAL, WALK_PUSH
+from poise.training.benchmarking.metrics.evaluated import DIRECTIONAL, WALK_PUSH
 from poise.training.benchmarking.results.read import Results
 from poise.training.benchmarking.statistics.fits import fit_logistic, trial_bins
 from poise.training.benchmarking.statistics.rates import wilson_interval

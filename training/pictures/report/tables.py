@@ -15,10 +15,10 @@ from poise.training.running.columns import (
     FAILURES,
     FAILURES_RECOVERED,
     GAIN,
-    HALF_AT,
     J50_BOUNDED,
     J50_MEAN,
     J50_PER_MASS,
+    J50_SCALED,
     J50_WORST,
     LOSSES,
     NOT_FALLEN,
@@ -63,7 +63,8 @@ def ranking(results: Results, baseline: str) -> Table | None:
     rates = (NOT_FALLEN, AS_COMMANDED) if walked(entries) else (RECOVERED, second)
     columns: tuple[Column, ...] = (
         RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
-        replace(HALF_AT, unit=f"× {results.summary['scale']}", words="half of the trials survive"),
+        replace(J50_SCALED, unit=f"× {results.summary['scale']}",
+                words="half of the trials survive"),
         *(replace(each, words=f"{each.words}{mix}") for each in rates),
         replace(TRIED[0], words=f"that the rate is of{mix}"),
         *AGAINST, P_VALUE, ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT,

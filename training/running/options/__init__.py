@@ -1,1 +1,1 @@
-"""How options of the command line are told and read: help, spellings, errors of one line."""
+"""Command line options: help, parsing, spellings, one-line errors."""

@@ -1,4 +1,4 @@
-"""The types of arguments that several sub-commands take, and a first look at what is given."""
+"""Types of arguments shared by several sub-commands, and early checks of their values."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ PolicyName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY"
 RobotName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
-Overwrite = Annotated[Switch, tyro.conf.arg(help="replace what the folder holds.")]
+Overwrite = Annotated[Switch, tyro.conf.arg(help="replace the contents of the folder.")]
 OnRobot = Annotated[
     str, tyro.conf.arg(help="a packaged robot (see poise list) or a .yaml description.")
 ]
@@ -34,15 +34,15 @@ Backend = Annotated[
 Json = Annotated[
     bool,
     tyro.conf.FlagCreatePairsOff,
-    tyro.conf.arg(help="Print the result as JSON; what people read goes to standard error."),
+    tyro.conf.arg(help="Print the result as JSON; other text goes to standard error."),
 ]
 Allow = Annotated[
     tuple[str, ...],
     tyro.conf.UseAppendAction,
     tyro.conf.arg(
         metavar="NAME",
-        help="What may run though a file names it: module:Class or file.py:Class of a controller "
-        "or a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.",
+        help="Code that may run although only a file names it: module:Class or file.py:Class of a "
+        "controller or policy, or a TorchScript file (.pt, .pth, .jit, .ts); repeatable.",
     ),
 ]
 
@@ -53,19 +53,18 @@ def print_json(value: object) -> None:
 
 
 def check_folders(*paths: str | Path) -> None:
-    """Raise ConfigError for a folder that there is not, before what reads it is imported."""
+    """Raise ConfigError for a missing folder, before any slow import."""
     for path in paths:
         if not is_folder(path):
             raise ConfigError("no such folder", source=path)
 
 
 def check_flags(args: Sequence[str], kinds: Mapping[str, str]) -> None:
-    """Raise ConfigError for the name of nothing behind a flag, of a command that takes long to read
-    its flags.
+    """Raise ConfigError for an unknown name after a flag, before a command's slow parsing.
 
     Args:
         args: of the command.
-        kinds: flag → the kind of what it names, a folder of poise.configs.
+        kinds: flag → kind of its value, a folder of poise.configs.
     """
     for flag, value in pairwise(args):
         if flag in kinds:

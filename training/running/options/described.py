@@ -1,4 +1,4 @@
-"""What each option of a configuration means: its sentence is that of its field's docstring."""
+"""Options of a configuration, described by the docstrings of its fields."""
 
 import dataclasses
 import inspect
@@ -21,11 +21,11 @@ class Option:
     """An option of a command.
 
     Attributes:
-        name: as it is typed, with its dashes.
-        kind: what is typed after it.
-        sentence: what it means, with its unit.
-        default: what holds without it, as text; empty where nothing does.
-        bounds: what a number must be, as text; empty where any will do.
+        name: with its dashes.
+        kind: form of its value.
+        sentence: meaning, with unit.
+        default: default value as text; empty without one.
+        bounds: valid range of a number as text; empty without one.
     """
 
     name: str
@@ -36,36 +36,36 @@ class Option:
 
     @property
     def group(self) -> str:
-        """The section of the configuration that it belongs to; empty for the top."""
+        """The section of the configuration; empty at the top level."""
         return self.name[2:].rpartition(".")[0]
 
 
 def entries(docstring: str | None) -> dict[str, str]:
-    """The entries of the section `Attributes` or `Args` of a docstring, each on one line."""
+    """Return the entries of a docstring's section `Attributes` or `Args`, each on one line."""
     found = SECTION.search(inspect.cleandoc(docstring or ""))
-    told: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for line in found[1].split("\n") if found else ():
         if entry := ENTRY.fullmatch(line):
-            told[name := entry[1]] = entry[2]
-        elif told:
-            told[name] += f" {line.strip()}"
-    return told
+            texts[name := entry[1]] = entry[2]
+        elif texts:
+            texts[name] += f" {line.strip()}"
+    return texts
 
 
 def sentences(cls: type) -> dict[str, str]:
-    """What the docstrings of a dataclass and of its bases say of its fields.
+    """Return the descriptions of a dataclass's fields from its docstring and those of its bases.
 
-    A weight of the reward is told by the formula in its field's metadata.
+    A weight of the reward is described by the formula in its field's metadata.
     """
-    told: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for each in reversed(cls.__mro__):
-        told |= entries(each.__dict__.get("__doc__"))
+        texts |= entries(each.__dict__.get("__doc__"))
     if issubclass(cls, OfKind):
-        told.setdefault("kind", "Which kind it is; another one is chosen in a file.")
+        texts.setdefault("kind", "The kind; choose another one in a file.")
     for field in dataclasses.fields(cls):
         if "formula" in field.metadata:
-            told[field.name] = f"Weight of the term {field.metadata['formula']}."
-    return {name: _sentence(text) for name, text in told.items()}
+            texts[field.name] = f"Weight of the term {field.metadata['formula']}."
+    return {name: _sentence(text) for name, text in texts.items()}
 
 
 def _sentence(text: str) -> str:
@@ -74,35 +74,35 @@ def _sentence(text: str) -> str:
 
 
 def options_of(config: Any, prefix: str = "--") -> Iterator[Option]:
-    """The options of a dataclass, those of the dataclasses in it after its own fields.
+    """Yield the options of a dataclass, first its own fields, then those of nested dataclasses.
 
-    A dataclass that is not there has none: a file alone can bring it.
+    A nested dataclass that is None has no options: only a file can set it.
 
     Args:
         config: an instance, whose values are the defaults.
-        prefix: of their names.
+        prefix: of the options' names.
     """
-    told, hints = sentences(type(config)), get_type_hints(type(config))
+    texts, hints = sentences(type(config)), get_type_hints(type(config))
     below = []
     for field in dataclasses.fields(config):
         value, name = getattr(config, field.name), prefix + field.name.replace("_", "-")
         if dataclasses.is_dataclass(value):
             below.append((value, f"{name}."))
         elif isinstance(value, Mapping) and value:
-            sentence = told.get(field.name, "")
+            sentence = texts.get(field.name, "")
             for key, each in value.items():
                 yield Option(f"{name}.{key}", "NUMBER", sentence, _text(each), _bounds(field))
         elif value is not None or not any(
             map(dataclasses.is_dataclass, get_args(hints[field.name]))
         ):
-            yield Option(name, kind_of(hints[field.name]), told.get(field.name, ""), _text(value),
+            yield Option(name, kind_of(hints[field.name]), texts.get(field.name, ""), _text(value),
                          _bounds(field))  # fmt: skip
     for value, deeper in below:
         yield from options_of(value, deeper)
 
 
 def kind_of(hint: Any) -> str:
-    """What is typed for a value of this type."""
+    """Return the form of a value of this type on the command line."""
     origin, args = get_origin(hint), get_args(hint)
     if origin is Literal:
         return "|".join(str(arg) for arg in args)

@@ -1,4 +1,4 @@
-"""What can be named, with a line on each: robots, controllers, policies, suites and the like."""
+"""Packaged names, each with one line: robots, controllers, policies, suites and others."""
 
 import json
 import re
@@ -12,7 +12,7 @@ KINDS = {
     "robots": "--robot",
     "controllers": "where a CONTROLLER is named",
     "policies": "where a CONTROLLER is named; poise.load_policy(NAME)",
-    "rivals": "someone else's policies, where a CONTROLLER is named",
+    "rivals": "policies of other projects, where a CONTROLLER is named",
     "guards": "a recovery policy over a walker, where a CONTROLLER is named",
     "suites": "--suite",
     "realism": "--realism",
@@ -25,8 +25,8 @@ KINDS = {
     "limits": "--limits",
     "human": "poise gait --human",
 }
-# j50: robot → name → mean J50 [N·s] of the leaderboards in docs/results; suites: robot → theirs;
-# policies: name → for what
+# j50: robot → name → mean J50 [N·s] of the leaderboards in docs/results; suites: robot → suite of
+# that J50; policies: name → purpose
 FIGURES = "packaged.json"
 MOVES = {
     "residual": "targets",
@@ -40,10 +40,10 @@ MOVES = {
 
 
 class Named(TypedDict, total=False):
-    """One of the packaged names.
+    """A packaged name.
 
-    `j50` is the mean J50 of the leaderboard of `robot` [N·s]; `on` the controller below a policy,
-    whose action moves `action`.
+    `j50` is the mean J50 on the leaderboard of `robot` [N·s]. `on` is the controller below a
+    policy, `action` what the policy's action moves.
     """
 
     name: str
@@ -55,13 +55,13 @@ class Named(TypedDict, total=False):
 
 
 def named() -> dict[str, list[Named]]:
-    """Every packaged name by its kind, with what is known of it."""
+    """Return all packaged names by kind, with their facts."""
     known = _known()
     return {kind: [_named(kind, name, known) for name in packaged(kind)] for kind in KINDS}
 
 
 def suites_of_j50() -> dict[str, str]:
-    """Return the suite by which J50 was measured, by robot."""
+    """Return robot → suite by which J50 was measured."""
     return dict(_known()["suites"])
 
 
@@ -90,7 +90,7 @@ def _named(kind: str, name: str, known: dict[str, dict[str, Any]]) -> Named:
 
 
 def first_comment(path: Path) -> str:
-    """The first sentence of the comment at the top of a file."""
+    """Return the first sentence of the comment at the top of a file."""
     lines: list[str] = []
     for line in path.read_text().splitlines():
         if not line.startswith("#"):

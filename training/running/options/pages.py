@@ -1,4 +1,4 @@
-"""A page of help: options in groups, each with its sentence, default and range."""
+"""Help pages: options in groups, each with description, default and range."""
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,12 +22,12 @@ def print_options(title: str, options: Iterable[Option], console: Console) -> No
         console.print(Text(f"  {option.name} {option.kind}".rstrip()), soft_wrap=True)
         default = f"default {option.default}" if option.default else ""
         facts = "; ".join(filter(None, (default, option.bounds)))
-        told = f"{option.sentence} ({facts})" if facts else option.sentence
-        console.print(Padding(Text(told), (0, 0, 0, INDENT), expand=False))
+        text = f"{option.sentence} ({facts})" if facts else option.sentence
+        console.print(Padding(Text(text), (0, 0, 0, INDENT), expand=False))
 
 
 def grouped(options: Sequence[Option], titles: Mapping[str, str]) -> dict[str, list[Option]]:
-    """Options by the section that they belong to, with the sections' own titles where there are."""
+    """Return options by section, under the section's title where it has one."""
     found: dict[str, list[Option]] = {}
     for option in options:
         group = option.group
@@ -38,7 +38,7 @@ def grouped(options: Sequence[Option], titles: Mapping[str, str]) -> dict[str, l
 
 def print_commands(usage: str, commands: Mapping[str, Callable[..., object]],
                    console: Console) -> None:  # fmt: skip
-    """Print what the commands do, each by the first sentence of its docstring."""
+    """Print the first sentence of each command's docstring."""
     console.print(Text(usage))
     table = Table.grid(padding=(0, 2))
     for name, function in commands.items():
@@ -49,7 +49,7 @@ def print_commands(usage: str, commands: Mapping[str, Callable[..., object]],
 def print_names(
     kinds: Mapping[str, list[Named]], suites: Mapping[str, str], console: Console
 ) -> None:
-    """Print a table of each kind of names, and by which suite J50 was measured on each robot."""
+    """Print a table for each kind of names, and the suite of J50 for each robot."""
     for kind, entries in kinds.items():
         console.print(Text(f"\n{kind} ({KINDS[kind]})", style="bold"))
         table = Table.grid(padding=(0, 2))
@@ -60,11 +60,11 @@ def print_names(
             cells = (entry.get(key, "") for key in keys)
             table.add_row(*(Text(f"{x:.1f}" if isinstance(x, float) else str(x)) for x in cells))
         console.print(table)
-    told = ", ".join(f"{suite} on {robot}" for robot, suite in suites.items())
-    console.print(Text(f"\nJ50: mean over all directions, as on the leaderboards; suite {told}"))
+    used = ", ".join(f"{suite} on {robot}" for robot, suite in suites.items())
+    console.print(Text(f"\nJ50: mean over all directions, as on the leaderboards; suite {used}"))
 
 
 def first_sentence(text: str | None) -> str:
-    """The first sentence of a text, which ends with its first paragraph at the latest."""
+    """Return the first sentence of a text, at most its first paragraph."""
     paragraph = " ".join((text or "").partition("\n\n")[0].split())
     return paragraph.partition(". ")[0].rstrip(".") + "." if paragraph else ""

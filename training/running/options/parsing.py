@@ -1,4 +1,4 @@
-"""Arguments read by a function's signature: what is wrong with them is an error of one line."""
+"""Parsing of arguments by a function's signature, with one-line errors."""
 
 import contextlib
 import functools
@@ -24,12 +24,12 @@ WRONG = {r"invalid choice ('.*') for argument '(.*)'. Expected one of \((.*?),?\
 
 
 def parsed(function: Callable[..., T], args: Sequence[str], prog: str) -> Callable[[], T]:
-    """The call of a function that these arguments ask for, not yet made.
+    """Return the function bound to these arguments, not yet called.
 
     Raises:
-        ConfigError: an unknown option, with the one that it looks like; a value that does not
-            parse; something that is needed.
-        SystemExit: the help was asked for, and printed.
+        ConfigError: an unknown option, with the most similar one; a value that does not parse; a
+            missing argument.
+        SystemExit: help was requested and printed.
     """
 
     @functools.wraps(function)
@@ -41,24 +41,24 @@ def parsed(function: Callable[..., T], args: Sequence[str], prog: str) -> Callab
 
 
 def answered(function: Callable[..., object], args: Sequence[str], prog: str) -> int:
-    """The exit code of a function called with these arguments: the int that it returns, else 0.
+    """Call a function with these arguments; return the int that it returns as exit code, else 0.
 
-    Raises as `parsed`, and what the function raises.
+    Raises as `parsed`, and whatever the function raises.
     """
-    given = ["--help" if arg == "--help-all" else arg for arg in args]  # all there is
+    given = ["--help" if arg == "--help-all" else arg for arg in args]  # it lists all
     code = parsed(function, given, prog)()
     return code if isinstance(code, int) else 0
 
 
 def option_names(function: Callable[..., object]) -> list[str]:
-    """The options that a function's parameters become."""
+    """Return the options made of a function's parameters."""
     parameters = inspect.signature(function).parameters.values()
     return [f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is not p.POSITIONAL_ONLY]
 
 
 @contextlib.contextmanager
 def one_line_errors(prog: str, options: Iterable[str], args: Sequence[str]) -> Iterator[None]:
-    """Make a ConfigError of what tyro prints before it leaves with code 2."""
+    """Convert tyro's error output and exit with code 2 to a ConfigError."""
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
@@ -70,7 +70,7 @@ def one_line_errors(prog: str, options: Iterable[str], args: Sequence[str]) -> I
 
 
 def _error(said: str, prog: str, options: list[str], args: Sequence[str]) -> ConfigError:
-    """The error that a box of tyro tells, as one line."""
+    """Return the error in a box printed by tyro, as one line."""
     lines = _first_part(said)
     text = " ".join(line.strip() for line in lines)
     if "nrecognized" in text:
@@ -90,14 +90,14 @@ def _error(said: str, prog: str, options: list[str], args: Sequence[str]) -> Con
 
 
 def _command(prog: str) -> str:
-    """The command as an error names it, whose line begins with `poise` already."""
+    """Return the command's name in an error, whose line already begins with `poise`."""
     return prog.removeprefix("poise ")
 
 
 def _first_part(said: str) -> list[str]:
-    """The lines of a box down to its first rule, without the box and its title.
+    """Return the lines of a box down to its first rule, without the box and its title.
 
-    A box is of lines, or, where the output takes ASCII alone, a title above a rule.
+    With ASCII output a box is a title above a rule.
     """
     lines: list[str] = []
     titled = "╭" in said
@@ -115,7 +115,7 @@ def _first_part(said: str) -> list[str]:
 
 
 def _unknown(text: str, prog: str, options: list[str], args: Sequence[str]) -> ConfigError:
-    """The error of the first argument that tyro does not know."""
+    """Return the error of the first unknown argument."""
     named = re.split(r"[,\s]+", text.partition(":")[2].strip())[0]
     wrong = next((arg for arg in args if arg.partition("=")[0] == named), named)
     flag = wrong.partition("=")[0]

@@ -1,22 +1,22 @@
-"""Older and other spellings of options, and what a wrong one looks like."""
+"""Older and alternative spellings of options, and suggestions for a wrong one."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
 from poise.configs.errors import meant
 
-#: command → how an option may be spelled, too, and how it is called there
+#: command → alternative spelling → option
 ALSO: Mapping[str, Mapping[str, str]] = {
     "replay": {"--controller": "--controllers"},
     "view": {"--controller": "--controllers"},
     **{name: {"--controllers": "--controller"} for name in ("walk", "tune", "qp-set", "train")},
 }
-#: commands that take controllers before the flags, and may be given them behind one
+#: commands with controllers as positional arguments → flags that are accepted for them
 BEFORE = {"evaluate": ("--controllers", "--controller"),
           "benchmark": ("--controllers", "--controller")}  # fmt: skip
 
 
 def respelled(command: str, args: Sequence[str]) -> list[str]:
-    """The arguments of a command as it calls them."""
+    """Return the arguments of a command in its own spelling."""
     names, before = ALSO.get(command, {}), BEFORE.get(command, ())
     front: list[str] = []
     rest: list[str] = []
@@ -34,15 +34,15 @@ def respelled(command: str, args: Sequence[str]) -> list[str]:
 
 
 def suggestion(flag: str, options: Iterable[str]) -> str:
-    """What an error of an unknown option adds: the one that it looks like, if any.
+    """Return a hint for an unknown option: the most similar one, or an empty text.
 
-    An option of a section is found by its own name, too: --gamma is --ppo.gamma.
+    An option of a section is also found by its last name: --gamma suggests --ppo.gamma.
     """
     options, flag = list(options), flag.replace("_", "-")
     last = {name.rpartition(".")[2].lstrip("-"): name for name in reversed(options)}
     if (own := flag.lstrip("-")) in last:
         return f", did you mean {last[own]}?"
-    if told := meant(flag, options):
-        return told
+    if hint := meant(flag, options):
+        return hint
     near = meant(own, last)
     return f", did you mean {last[near[15:-1]]}?" if near else ""

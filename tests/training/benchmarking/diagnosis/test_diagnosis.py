@@ -15,7 +15,7 @@ from poise.training.benchmarking.diagnosis.diagnosis import (
     Diagnosis,
     _capture,
     _foothold,
-    _full,
+    _saturated,
     distance_outside,
     touching_body,
 )
@@ -24,8 +24,8 @@ from poise.training.benchmarking.diagnosis.words import (
     cause,
     diagnosis_of,
     losses,
-    push_told,
-    told_losses,
+    losses_text,
+    push_text,
     why,
 )
 from poise.training.benchmarking.trials.agents import load_agent
@@ -87,9 +87,9 @@ def test_the_first_motor_at_its_limit_after_the_push() -> None:
         1.0,
         1.0,
     )
-    told = _full(ENV, found, start=0.04)
+    told = _saturated(ENV, found, start=0.04)
     assert told == {"full_motor": "ankle", "full_from": 0.1, "full_time": 0.08}
-    assert _full(ENV, course(), start=0.0) == {}
+    assert _saturated(ENV, course(), start=0.0) == {}
 
 
 def test_the_capture_point_leaves_for_the_last_time() -> None:
@@ -166,10 +166,10 @@ def test_words() -> None:
     assert "falling already" not in why(early)
     assert cause(replace(plain, hardware="ankle motors too hot"), 0).startswith("ankle motors too")
     counted = losses([(plain, 0), (found, 2), (plain, 0), (Diagnosis(), 0)])
-    assert told_losses(counted) == ("of 3 losses 2: ankle_y at its limit, then no planned step; "
+    assert losses_text(counted) == ("of 3 losses 2: ankle_y at its limit, then no planned step; "
                                     "1: ankle_y at its limit, then a foothold missed")  # fmt: skip
-    assert why(diagnosis_of({})) == "" and told_losses([]) == ""
-    assert push_told(Push("torso", 1.0, 0.1, 20.0, 90.0)) == (
+    assert why(diagnosis_of({})) == "" and losses_text([]) == ""
+    assert push_text(Push("torso", 1.0, 0.1, 20.0, 90.0)) == (
         "a push of 20.0 N·s in 0.10 s on torso towards 90° (left), at 1.00 s"
     )
-    assert push_told(Kick(1.0, 0.5, -44.0)).startswith("a kick of 0.50 m/s towards -44° (forward r")
+    assert push_text(Kick(1.0, 0.5, -44.0)).startswith("a kick of 0.50 m/s towards -44° (forward r")

@@ -289,7 +289,7 @@ def test_a_suite_is_played_again_at_levels(tmp_path: Path, in_process: type[InPr
     kept = summary["controllers"]["momentum-qp"]["levels"][1]["j50_kept"]
     one, two = (level["j50_mean"] for level in summary["controllers"]["momentum-qp"]["levels"])
     assert kept == pytest.approx(two / one)
-    assert "at levels of realism" in told.getvalue()
+    assert "by realism level" in told.getvalue()
     marks = {line["part"]: line["realism"] for line in lines(tmp_path / "again")}
     assert marks["quiet@field"] == marks["envelope@field"] == "field"
     assert not marks["quiet"]

@@ -18,7 +18,7 @@ EDGES = "│┃┓┐┩┘┛"
 
 
 def entries(measure: str, values: dict[str, tuple[float, float]]) -> dict[str, Entry]:
-    """Name → (result, force from nowhere) as entries of a summary."""
+    """Name → (result, external root force) as entries of a summary."""
     made: dict[str, Any] = {
         name: {measure: value, "recovered_rate": 0.5, "root_force_max": force}
         for name, (value, force) in values.items()

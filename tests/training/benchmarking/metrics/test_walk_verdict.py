@@ -18,8 +18,8 @@ from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.benchmarking.evaluation.tables import places, print_summary, ranked
 from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
+from poise.training.benchmarking.metrics.evaluated import Evaluated
 from poise.training.benchmarking.metrics.pairs import pair_figures
-from poise.training.benchmarking.metrics.played import Played
 from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
@@ -40,13 +40,13 @@ def limits() -> PushLimits:
 
 def figures(
     limits: PushLimits, part: dict[str, Any], ends: dict[str, Any]
-) -> tuple[dict[str, Entry], dict[str, Played], Plan]:
+) -> tuple[dict[str, Entry], dict[str, Evaluated], Plan]:
     """Entries of controllers, whose trials end as `ends` says of each."""
     plan = Plan(build(Suite, part, "suite"), limits, 3, tuple(ends))
     known = {(name, t.number): end(t) for t in plan.first for name, end in ends.items()}
     for name, trials in plan.second(known).items():
         known |= {(name, trial.number): ends[name](trial) for trial in trials}
-    played: dict[str, Played] = {
+    played: dict[str, Evaluated] = {
         name: [(trial, known[name, trial.number]) for trial in trials]
         for name, trials in plan.trials(known).items()
     }

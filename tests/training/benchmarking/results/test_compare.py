@@ -117,7 +117,7 @@ def test_a_comparison_says_what_changed(tmp_path: Path) -> None:
     j50 = changes["mean J50 [N·s]"]
     assert (j50.change, j50.low, j50.high) == pytest.approx((5.0, 5 - 2**0.5, 5 + 2**0.5))
     assert j50.certain and not changes["η mean"].certain
-    mix = changes["recovered of the mix"]
+    mix = changes["recovered, mix"]
     assert mix.change == 0.75 and mix.note == "0 lost, 3 won, p = 0.25"
     assert changes["delay 0.02"].note == "" and changes["delay 0.02"].change == 0.0
     assert "J50 at 0° [N·s]" in changes

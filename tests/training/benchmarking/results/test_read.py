@@ -161,7 +161,7 @@ def test_a_stopped_evaluation_is_told_apart(tmp_path: Path) -> None:
     """The text says how to finish it."""
     folder = copied("random", tmp_path)
     (folder / "summary.json").unlink()
-    with pytest.raises(ConfigError, match="summary.json missing; the command that began it"):
+    with pytest.raises(ConfigError, match="summary.json missing; run the command that began it"):
         load_results(folder)
     with pytest.raises(ConfigError, match="no such folder"):
         load_results(tmp_path / "nowhere")

@@ -89,7 +89,7 @@ def test_the_table_of_limits_is_read_with_its_controller(limits: PushLimits) -> 
         ({"names": []}, "names: must not be empty"),
         ({"shares": [0.5, 0.5]}, "shares: 0.5 comes twice"),
         ({"names": ["a/x.npz", "b/x.npz"]}, "names: x comes twice"),
-        ({"names": ["standing"]}, "names: standing is played by itself"),
+        ({"names": ["standing"]}, "names: standing is always included"),
         ({"of": "mine"}, "of"),
     ],
 )

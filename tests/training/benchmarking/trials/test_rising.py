@@ -11,7 +11,7 @@ from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.start import FALLEN_POSTURES
 from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmarking.metrics.played import rising
+from poise.training.benchmarking.metrics.evaluated import rising
 from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import Agent, load_agent

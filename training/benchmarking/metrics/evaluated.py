@@ -1,4 +1,4 @@
-"""Trials of one controller with their outcomes, as arrays and in parts."""
+"""Evaluated trials of one controller with their outcomes, as arrays and in parts."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
@@ -18,72 +18,75 @@ from poise.training.benchmarking.trials.trial import won as is_won
 from poise.training.running.trial_figures import Counts, Rate, Rising
 
 Key = TypeVar("Key")
-Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
+Evaluated = Sequence[tuple[Trial, Outcome]]  # of one controller, ordered by number
 RATED = ("mix", "motions")  # parts that the counts are of, where a suite has one
 WALK_PUSH = "walk_push"
 DIRECTIONAL = ("envelope", "grid", WALK_PUSH)  # parts that J50 of each direction is fitted to
 SECTOR = 45.0  # [deg] in which random directions are counted together
 
 
-def part(played: Played, *names: str) -> Played:
-    """The trials of some parts."""
-    return [(trial, outcome) for trial, outcome in played if trial.part in names]
+def part(evaluated: Evaluated, *names: str) -> Evaluated:
+    """Return the trials of some parts."""
+    return [(trial, outcome) for trial, outcome in evaluated if trial.part in names]
 
 
-def once(played: Played) -> Played:
-    """The trials without those that are played again at a level of realism."""
-    return [(trial, outcome) for trial, outcome in played if LEVEL not in trial.part]
+def once(evaluated: Evaluated) -> Evaluated:
+    """Return the trials without those repeated at another realism level."""
+    return [(trial, outcome) for trial, outcome in evaluated if LEVEL not in trial.part]
 
 
-def rated(played: Played) -> Played:
-    """The trials that a controller is rated by: those of the mix, else all that is played once.
+def rated(evaluated: Evaluated) -> Evaluated:
+    """Return the rated trials: those of the random suite `mix`, else all at the suite's own level.
 
-    Of pushed walks those that all controllers meet: a second stage is harder the better they are.
+    Of pushed walks only the first stage counts: the second is harder for better controllers.
     """
-    return part(played, *RATED) or met_by_all(once(played))
+    return part(evaluated, *RATED) or met_by_all(once(evaluated))
 
 
-def met_by_all(played: Played) -> Played:
-    """The trials without the second stage of pushed walks, whose pushes a controller chose."""
-    return [(trial, outcome) for trial, outcome in played
+def met_by_all(evaluated: Evaluated) -> Evaluated:
+    """Return the trials without the second stage of pushed walks, whose pushes a controller
+    chose."""
+    return [(trial, outcome) for trial, outcome in evaluated
             if trial.part != WALK_PUSH or trial.stage == 1]  # fmt: skip
 
 
-def by_falls(played: Played) -> bool:
-    """Whether all of these trials are won by not falling, see `Trial.judged_by_falls`."""
-    return bool(played) and all(trial.judged_by_falls for trial, _ in played)
+def by_falls(evaluated: Evaluated) -> bool:
+    """Return whether all of these trials are judged by falls, see `Trial.judged_by_falls`."""
+    return bool(evaluated) and all(trial.judged_by_falls for trial, _ in evaluated)
 
 
-def cells(played: Played, key: Callable[[Trial], Key]) -> dict[Key, list[tuple[Trial, Outcome]]]:
-    """The trials that have this in common, in the order of the first of them."""
+def cells(
+    evaluated: Evaluated, key: Callable[[Trial], Key]
+) -> dict[Key, list[tuple[Trial, Outcome]]]:
+    """Return the trials grouped by `key`, in order of first appearance."""
     found: dict[Key, list[tuple[Trial, Outcome]]] = {}
-    for trial, outcome in played:
+    for trial, outcome in evaluated:
         found.setdefault(key(trial), []).append((trial, outcome))
     return found
 
 
-def pushes(played: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pushes(evaluated: Evaluated) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Direction [deg], impulse [N·s] and duration [s] of every trial's push."""
-    found = [(t.push.direction, t.push.impulse, t.push.duration) for t, _ in played if t.push]
+    found = [(t.push.direction, t.push.impulse, t.push.duration) for t, _ in evaluated if t.push]
     direction, impulse, duration = np.array(found).reshape(-1, 3).T
     return direction, impulse, duration
 
 
-def won(played: Played) -> np.ndarray:
-    """An array (n,), true where a trial was won: recovered, or of a walk not fallen."""
-    return np.array([is_won(trial, outcome) for trial, outcome in played], dtype=bool)
+def won(evaluated: Evaluated) -> np.ndarray:
+    """Return an array (n,), true where a trial was won: recovered, or of a walk not fallen."""
+    return np.array([is_won(trial, outcome) for trial, outcome in evaluated], dtype=bool)
 
 
-def fractions(played: Played) -> np.ndarray:
+def fractions(evaluated: Evaluated) -> np.ndarray:
     """Impulse over the limit of every trial."""
-    return np.array([trial.limit_fraction for trial, _ in played], dtype=float)
+    return np.array([trial.limit_fraction for trial, _ in evaluated], dtype=float)
 
 
-def sectors(played: Played) -> EnvelopeFit:
-    """Fits of the fraction of the limit in sectors of 45°, named by their middle."""
-    direction, _, _ = pushes(played)
+def sectors(evaluated: Evaluated) -> EnvelopeFit:
+    """Return fits of the fraction of the limit in sectors of 45°, named by their middle."""
+    direction, _, _ = pushes(evaluated)
     middle = SECTOR * (np.rint(direction / SECTOR) % (360.0 / SECTOR))
-    return mean_over_directions(middle, fractions(played), won(played))
+    return mean_over_directions(middle, fractions(evaluated), won(evaluated))
 
 
 def fitted(one: DirectionFit, name: str) -> dict[str, Any]:
@@ -98,26 +101,26 @@ def fitted(one: DirectionFit, name: str) -> dict[str, Any]:
     }
 
 
-def rate(played: Played) -> Rate:
-    """The counts of recovered and of fallen trials, and their rates, with intervals."""
-    trials = len(played)
-    recovered = sum(outcome.recovered for _, outcome in played)
-    upright = sum(outcome.upright for _, outcome in played)
+def rate(evaluated: Evaluated) -> Rate:
+    """Return the counts of recovered and of fallen trials, and their rates, with intervals."""
+    trials = len(evaluated)
+    recovered = sum(outcome.recovered for _, outcome in evaluated)
+    upright = sum(outcome.upright for _, outcome in evaluated)
     return {
         "trials": trials,
         "recovered": recovered,
         "recovered_rate": recovered / trials,
         "recovered_ci95": wilson_interval(recovered, trials),
-        "fallen": sum(outcome.fallen for _, outcome in played),
+        "fallen": sum(outcome.fallen for _, outcome in evaluated),
         "never_fell_rate": upright / trials,
         "never_fell_ci95": wilson_interval(upright, trials),
     }
 
 
-def counts(played: Played) -> Counts:
-    """Counts of how trials ended, and medians of what was recorded, some of those that were won."""
-    outcomes = [outcome for _, outcome in played]
-    standing = [outcome for trial, outcome in played if is_won(trial, outcome)]
+def counts(evaluated: Evaluated) -> Counts:
+    """Return counts of outcomes, and medians of figures, some of them of won trials only."""
+    outcomes = [outcome for _, outcome in evaluated]
+    standing = [outcome for trial, outcome in evaluated if is_won(trial, outcome)]
     unpushed = [outcome for outcome in outcomes if outcome.com_drift is not None]
 
     def over(
@@ -128,7 +131,7 @@ def counts(played: Played) -> Counts:
         return float(function(values)) if values else None
 
     return {
-        **rate(played),
+        **rate(evaluated),
         "recovered_with_step": sum(outcome.foot_displaced for outcome in standing),
         "recovered_in_place": sum(o.steps == 0 and not o.foot_displaced for o in standing),
         "steps_mean": over("steps", np.mean),
@@ -168,13 +171,12 @@ def rising(outcomes: Sequence[Outcome]) -> Rising:
     }
 
 
-def ankle_limits(played: Played, limits: PushLimits) -> np.ndarray:
-    """The ankle limit [N·s] for the push of every trial."""
-    direction, _, duration = pushes(played)
+def ankle_limits(evaluated: Evaluated, limits: PushLimits) -> np.ndarray:
+    """Return the ankle limit [N·s] for the push of every trial."""
+    direction, _, duration = pushes(evaluated)
     return np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])
 
 
-def lost(played: Played) -> list[int]:
-    """The numbers of the trials of the suite's own level that were not won, rising: those whose
-    causes are counted."""
-    return [trial.number for trial, outcome in once(played) if not is_won(trial, outcome)]
+def lost(evaluated: Evaluated) -> list[int]:
+    """Return the sorted numbers of the trials at the suite's own level that were lost."""
+    return [trial.number for trial, outcome in once(evaluated) if not is_won(trial, outcome)]
