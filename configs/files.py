@@ -12,7 +12,7 @@ from .errors import ConfigError, PoiseError, meant, shown
 from .outputs import check_out_folder
 from .reading import is_file, is_folder
 
-#: kind → suffixes that do besides those of YAML
+#: kind → suffixes that are accepted in addition to those of YAML
 OTHERS = {"robots": (".xml", ".mjcf", ".urdf")}
 
 

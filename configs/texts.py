@@ -1,6 +1,6 @@
 """Texts that anybody may have written, as they are in pages, Markdown and terminals.
 
-A name comes from a file, a folder or a result of somebody else. Where it goes into Markdown it is
+A name may come from an untrusted file, folder or result. Where it goes into Markdown it is
 `plain` or `code`; Rich's tables take it escaped (`rich.markup.escape`), templates of pages escape
 by themselves, and a `Terminal` prints what cannot be printed as an escape.
 """

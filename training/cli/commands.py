@@ -38,13 +38,12 @@ def demo(
 ) -> None:
     """Push four controllers and compare: a table, two plots and a video, in a minute or so.
 
-    momentum-qp, whose feet stay in place; capture-step, which steps; feedback-step, which steps
-    better; the policy residual-torque on top of that. The same command goes on where it was
-    stopped.
+    momentum-qp keeps its feet fixed; capture-step steps; feedback-step steps better; the policy
+    residual-torque runs on top of feedback-step. Run the same command again to resume.
 
     Args:
         out: folder to write to; out/demo, or out/demo-full, if not given.
-        full: more pushes, random ones too, and a policy with feet in place: some minutes.
+        full: more pushes, random ones too, and a policy with feet fixed: some minutes.
         workers: number of processes; all cores if not given.
         seed: of the pushes.
     """
@@ -92,8 +91,8 @@ def evaluate(
     Args:
         controllers: a name of `poise list`, such as residual-torque (a shipped policy), zero (no
             torque), a .yaml file of a controller, a folder written by poise train, with --seeds
-            too, or a class of your own, my_file.py:Class or module:Class. What a file or a folder
-            names so needs --allow my_file.py:Class besides.
+            too, or a class of your own, my_file.py:Class or module:Class. A class that a file or a
+            folder names also needs --allow my_file.py:Class.
         suite: strong (random pushes that tell good controllers apart), random, envelope, grid,
             quiet, repeated, in-step, follow, those of poise benchmark, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
@@ -163,9 +162,9 @@ def benchmark(
 
     Args:
         controllers: names as poise evaluate takes them, also my_file.py:Class (one that a file or
-            a folder names needs --allow my_file.py:Class besides); all packaged ones that can rest
+            a folder names also needs --allow my_file.py:Class); all packaged ones that can rest
             if not given.
-        out: folder to write to; needed, but with --submit.
+        out: folder to write to; required, except with --submit.
         suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
             .yaml file.
         seed: of the cases.

@@ -15,10 +15,10 @@ Checked = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
 def show() -> None:
-    """List the public policies that are known, where they are, and how to get the others.
+    """List the known public policies, where they are installed, and how to get the others.
 
-    Each is played by its name: poise evaluate falcon-g1 --robot unitree_g1. poise policies check
-    FILE says what is missing of another one.
+    Run each by its name: poise evaluate falcon-g1 --robot unitree_g1. For another policy,
+    poise policies check FILE reports what is missing.
     """
     from poise.baselines.policy_files.known import known_policies
     from poise.training.deploy.policy_check.tables import print_policies

@@ -98,20 +98,20 @@ def replay(
             check_out_file(file, field)
     if plot is not None and len(controllers) > 1:
         raise ConfigError("of one controller alone", field="plot")
-    played = [
+    replays = [
         replay(folder, trial, name, plot=plot, allow=allow) for name in controllers or (None,)
     ]
-    for done in played:
+    for done in replays:
         _print_replay(done)
     if video is not None:
-        film(folder, trial, [done.controller for done in played], video, allow=allow)
+        film(folder, trial, [done.controller for done in replays], video, allow=allow)
     for path in (video, plot):
         if path is not None:
             print(path)
 
 
 def _print_replay(done: "Replay") -> None:
-    """How a trial ended that was played again, why, and in what it differs from its record."""
+    """Print how a trial that was simulated again ended, why, and how it differs from its record."""
     from poise.training.benchmarking.diagnosis.words import push_told, why
 
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"

@@ -168,10 +168,10 @@ def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
 
 def options(config: TrainConfig) -> list[Option]:
     """All options: the command's own, then the fields of the configuration."""
-    told, hints, own = sentences(Command), get_type_hints(Command), []
+    helps, hints, own = sentences(Command), get_type_hints(Command), []
     for name, default in ((f.name, f.default) for f in fields(Command) if f.name != "settings"):
         kind = "" if isinstance(default, bool) else kind_of(hints[name])
-        own.append(Option(f"--{name}", kind, told[name], ""))
+        own.append(Option(f"--{name}", kind, helps[name], ""))
     return [*own, *options_of(config)]
 
 

@@ -29,7 +29,7 @@ Commands = Annotated[
     tyro.conf.UseAppendAction,
     tyro.conf.arg(
         metavar="COMMAND",
-        help="What a controller that walks is told, such as '{ahead: 0.6, left: 0, turn: 0.2, "
+        help="Command to a controller that walks, such as '{ahead: 0.6, left: 0, turn: 0.2, "
         "start: 1}' in m/s, rad/s and s; repeatable.",
     ),
 ]

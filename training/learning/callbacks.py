@@ -206,8 +206,8 @@ class Checkpoints(BaseCallback):
 class Progress(BaseCallback):
     """A progress bar with the recovery rate of the latest episodes and steps per second.
 
-    Its total is the end of the last rollout. It comes before `Checkpoints`, which evaluates at the
-    start, and is told so by `say`.
+    Its total is the end of the last rollout. List it before `Checkpoints`, which evaluates at the
+    start and reports that through `say`.
     """
 
     def __init__(self, config: TrainConfig):

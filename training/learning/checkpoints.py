@@ -37,7 +37,7 @@ from .policy_files import (
     read_statistics,
 )
 
-#: made anew by `PPO.load`, or of the running process alone
+#: rebuilt by `PPO.load`, or valid in the running process only
 LEFT_OUT = ("ep_info_buffer", "ep_success_buffer", "lr_schedule")
 FEW = 1e5  # observations: a few rollouts
 
@@ -89,8 +89,8 @@ def restore(
     """Load weights, optimizer and statistics into `model` and `normalize`; returns the state.
 
     With `newest` the network of `model` may be larger than the stored one, whose observation is the
-    part before that entry; the optimizer then begins anew. Raises ConfigError naming the file that
-    cannot be read or is for another robot than the one with this `fingerprint`.
+    part before that entry; the optimizer then starts afresh. Raises ConfigError naming the file
+    that cannot be read or is for another robot than the one with this `fingerprint`.
     """
     state = read_state(folder / STATE)
     check_robot(state, fingerprint, folder / STATE)

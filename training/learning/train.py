@@ -63,8 +63,8 @@ def train(
     `config.start_from`, if there is one, of the same robot; its network may be smaller
     (`widened`). The same configuration gives the same weights, whatever the number of threads; a
     resumed run starts new episodes, and so differs. `callback`, one of Stable-Baselines3 or
-    several, is called besides, such as Weights & Biases' `WandbCallback`; what it only reads
-    changes nothing. A controller from outside (``module:Class``)
+    several, is also called, such as Weights & Biases' `WandbCallback`; one that only reads
+    does not change the result. A controller from outside (``module:Class``)
     that the configuration names must be among `allow`.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way

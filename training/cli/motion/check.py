@@ -110,9 +110,9 @@ def follow(
         push: impulse of a push at a random time of the motion [N s]; 0 for none.
         share: the same as a share of the J50 of the push's direction, standing (configs/limits).
         directions: of the pushes, spread evenly, one after the other.
-        tempo: how many times as fast the motion is played.
-        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
-        waits: let the motion wait while the robot catches itself.
+        tempo: speed factor of the motion.
+        realism: realism level: ideal, lab, field, or a .yaml file.
+        waits: let the motion wait while the robot recovers.
         fastest: find the largest tempo at which none of the trials falls.
         seed: of starts and pushes.
         out: a JSON file to write the trials to.

@@ -96,7 +96,7 @@ def convert(
         mirror: exchange left and right.
         reverse: play it backwards.
         turn: about the vertical axis [degrees].
-        close: seconds over which the end is led to the first frame.
+        close: seconds over which the end is blended into the first frame.
         loop: how many times, one after the other.
         rate: frames a second.
         robot: whose .npz it is.

@@ -36,9 +36,9 @@ def write_dataset(
     seed: int = 0,
     allow: str | Iterable[str] = (),
 ) -> dict[str, int]:
-    """Play trials and write them as a data set of Minari into the folder `out`.
+    """Run trials and write them as a Minari data set into the folder `out`.
 
-    Each episode is a trial. Its `infos` hold the push as arrays (`push_arrays`) and `is_success`.
+    Each episode is a trial; `infos` contain the push as arrays (`push_arrays`) and `is_success`.
     ``MINARI_DATASETS_PATH=OUT`` lets `minari.load_dataset` find it.
 
     Args:

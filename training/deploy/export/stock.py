@@ -35,8 +35,8 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
     """Write `archive` for `PPO.load`, and the statistics for `VecNormalize.load`.
 
     `env` is the policy's environment, `source` its folder. A symmetric policy becomes an ordinary
-    one that is twice as wide, and as symmetric. The optimizer begins anew. Raises PoiseError where
-    what SB3 makes of an observation differs by more than `TOLERANCE`.
+    one of twice the width that is still symmetric. The optimizer starts afresh. Raises PoiseError
+    if SB3's action for an observation differs by more than `TOLERANCE`.
     """
     import torch
     from stable_baselines3.common.vec_env import VecNormalize

@@ -1,4 +1,4 @@
-"""All that is found out about a policy of somebody else on a robot."""
+"""All checks of an external policy on a robot."""
 
 import hashlib
 from dataclasses import dataclass
@@ -70,9 +70,9 @@ class PolicyCheck:
 def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> PolicyCheck:
     """Check a policy: a network, or whatever `controller_config` takes for one.
 
-    A network that nothing describes is not played: what a description needs is told.
+    A network without a description is not run: what a description needs is reported.
 
-    Raises ConfigError for what is no policy, or is described wrongly: in the words of the field.
+    Raises ConfigError, which names the field, for a file that is no policy or a wrong description.
     """
     path = Path(file)
     bare = is_file(path) and (is_script(path) or is_network(path))

@@ -47,7 +47,7 @@ class Sizes:
 
     Attributes:
         inputs: name → numbers; None where they are left open.
-        outputs: name → numbers, likewise.
+        outputs: name → numbers; None where they are left open.
     """
 
     inputs: dict[str, int | None]

@@ -26,10 +26,10 @@ class Rollout:
     """Steps of a policy as its maker saw them: T of them.
 
     Attributes:
-        observations: (T, n) what each input of the network was given; "" stands for the only one.
-        actions: (T, na) what it answered.
-        qpos, qvel: (T, nq), (T, nv) the states, as MuJoCo has them of this robot; None: not told.
-        memories: (T, …) what it remembered before each step, by name; empty: not told.
+        observations: (T, n) values of each input of the network; "" stands for the only one.
+        actions: (T, na) its outputs.
+        qpos, qvel: (T, nq), (T, nv) states in MuJoCo's order; None: not recorded.
+        memories: (T, …) its recurrent state before each step, by name; empty: not recorded.
     """
 
     observations: dict[str, np.ndarray]
@@ -41,7 +41,7 @@ class Rollout:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was compared, whether it is right (None: that cannot be told), and by how much."""
+    """What was compared, whether it is right (None: undecided), and by how much."""
 
     what: str
     right: bool | None
@@ -146,7 +146,7 @@ def _judged(
         lengths = np.linalg.norm(shown / np.array(place.term.scale), axis=1)
         worst = float(np.max(np.abs(lengths - 1.0)))
         return worst < UNIT, f"its length is 1 within {worst:.1g}"
-    return None, "cannot be told without states (qpos, qvel)"
+    return None, "undecided without states (qpos, qvel)"
 
 
 def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray | None:

@@ -19,7 +19,7 @@ OPEN = {
     "history": "not said: how its history lies; each usual order was tried:",
     "clock": "not said: what its clock shows at rest; tried:",
 }
-VERDICTS = {True: "right", False: "WRONG", None: "not told"}
+VERDICTS = {True: "right", False: "WRONG", None: "undecided"}
 
 
 def print_policies(known: list[Known], console: Console) -> None:
@@ -147,5 +147,5 @@ def _verdict(check: PolicyCheck) -> str:
     if not check.findings:
         return ("that it stands is a sign, no proof: --rollout compares it with steps of its "
                 "maker's loop")  # fmt: skip
-    told = sum(each.right is True for each in check.findings)
-    return f"the adapter is right, as far as {told} of {len(check.findings)} findings tell"
+    right = sum(each.right is True for each in check.findings)
+    return f"the adapter is right, as far as {right} of {len(check.findings)} findings show"

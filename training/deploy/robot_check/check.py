@@ -54,7 +54,7 @@ class RobotCheck:
         directions: margins, and pushes that a pendulum stops.
         dynamics: light joints, friction, flags.
         rest: two seconds at rest with momentum-qp.
-        notes: what was changed of the model so that it can be played.
+        notes: what was changed in the model so that it can be simulated.
         controllers: "in place" and "stepping" → which packaged ones take the robot.
     """
 

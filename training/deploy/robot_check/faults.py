@@ -216,7 +216,7 @@ def _slow_legs(check: RobotCheck) -> Iterator[Fault]:
         yield Fault(
             "slow legs",
             "against the damping of their joints the motors do not lift a foot and set it down in "
-            f"the longest step of {', '.join(names)}: feet stay in place with these",
+            f"the longest step of {', '.join(names)}: feet stay fixed with these",
             stepping=True,
         )
 

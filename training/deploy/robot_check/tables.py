@@ -73,7 +73,7 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
 
 def _rest(rest: Rest) -> str:
     if rest.refused:
-        return f"not played: {rest.refused}"
+        return f"not simulated: {rest.refused}"
     end = f"falls after {rest.duration:.2f} s" if rest.fallen else f"stands {rest.duration:.1f} s"
     return (f"{end} with {CONTROLLER}; torques change by {rest.chatter:.1f} limits/s, feet drift "
             f"{1000 * rest.foot_drift:.1f} mm, the CoM {1000 * rest.com_drift:.1f} mm, the root "

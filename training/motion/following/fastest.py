@@ -1,4 +1,4 @@
-"""How fast a motion may be played until a controller falls."""
+"""Largest speed factor of a motion at which a controller does not fall."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ from poise.envs.robots.robot import Robot
 
 from .follow import Followed, follow
 
-STEP = 0.05  # of the tempo that is told
+STEP = 0.05  # resolution of the reported tempo
 STARTS = 5
 MOST = 4.0  # times as fast, at most
 

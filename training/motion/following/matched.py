@@ -66,7 +66,7 @@ class Commands:
 def matched(
     files: Sequence[str], commands: Sequence[str], seconds: float, start: str = ""
 ) -> tuple[Matched, MatchingDatabase]:
-    """The motion that does what is asked for, of clips of one skeleton.
+    """Return the motion that follows the commands, made of clips of one skeleton.
 
     Args:
         files: .bvh files or names of packaged clips; none for the packaged ones, walks too.
@@ -121,7 +121,7 @@ def beyond(command: Command, database: MatchingDatabase) -> Command | None:
 def print_matched(
     made: Matched, database: MatchingDatabase, commands: Commands, console: Console
 ) -> None:
-    """What is played of which clip, how fast the whole goes, and what becomes of each command."""
+    """Print which parts of which clips are used, the speed, and how well each command is met."""
     dt = database.clips[0].dt
     rows = (
         (database.clips[piece.clip].name, f"{piece.first * dt:.2f} s", f"{piece.last * dt:.2f} s",

@@ -44,7 +44,7 @@ def open_synthesis(
         kind: of transitions that scripts leave open; None for `physical` with a robot, else
             `insert`.
         least: shortest transition of the packaged clips [s].
-        script: that is to be played.
+        script: to perform.
 
     Raises:
         ConfigError: a graph of another robot, a clip that changed, `physical` without a robot; as
@@ -60,10 +60,11 @@ def open_synthesis(
                               source=file, field="robot")  # fmt: skip
         loaded = load_clips([_beside(clip.file, file) for clip in made.clips], body,
                        [clip.name for clip in made.clips])  # fmt: skip
-        for told, (found, _) in zip(made.clips, loaded, strict=True):
-            if told.digest and told.digest != found.digest:
-                raise ConfigError(f"is not the file that it was: {told.file}; make the graph again",
-                                  source=file, field=f"clips.{told.name}")  # fmt: skip
+        for recorded, (found, _) in zip(made.clips, loaded, strict=True):
+            if recorded.digest and recorded.digest != found.digest:
+                raise ConfigError(
+                    f"is not the file that it was: {recorded.file}; make the graph again",
+                    source=file, field=f"clips.{recorded.name}")  # fmt: skip
         return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
                          robot_joins=joins)  # fmt: skip
     names = packaged_clips()

@@ -56,7 +56,7 @@ def compare_gaits(
     say: Say = print,
     allow: str | Iterable[str] = (),
 ) -> list[GaitFigures]:
-    """Let controllers walk at the same commands from the same starts, and write what came of it.
+    """Run walking controllers on the same commands and initial states; write the outcomes.
 
     `out` gets gaits.json and stance_knee.png, and with `pushed` the folder walk-push.
 

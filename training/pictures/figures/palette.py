@@ -7,8 +7,8 @@ from matplotlib.colors import to_hex, to_rgb
 
 from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, RGB
 
-# Okabe and Ito's palette: told apart with any colour vision. Line and marker repeat what the colour
-# says, for prints in grey.
+# Okabe and Ito's palette: distinguishable with any colour vision. Line and marker repeat the
+# colour's meaning, for prints in grey.
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 AMBER = "#E69F00"
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, "#6250B5", "#B3263E")  # violet and crimson last

@@ -107,7 +107,7 @@ def forest(out: Out, series: Sequence[Series], title: str, form: str) -> None:
         out: PNG file to write, or a place in a page.
         series: of one value each.
         title: what the values are, below them.
-        form: in which they are told.
+        form: format specification of the printed values.
 
     Raises PoiseError if the file cannot be written.
     """

@@ -63,12 +63,12 @@ def factor_plots(results: Results, order: Sequence[str]) -> list[dict[str, str]]
             at = [levels.index(level["level"]) for level in own]
             found.append(rate_series(name, results.controllers.index(name), at, counts))
         title = TITLES.get(factor, factor)
-        told = "; ".join(
+        rates = "; ".join(
             f"{s.name} "
             + ", ".join(f"{levels[int(x)]}: {y:.0%}" for x, y in zip(s.x, s.y, strict=True))
             for s in found
         )
-        out = Inline(f"Recovery rate over {title}: {told}.")
+        out = Inline(f"Recovery rate over {title}: {rates}.")
         level_curves(out, found, levels, standard[0] if standard else None)
         pictures.append({"title": title[:1].upper() + title[1:], "picture": out.svg})
     return pictures
@@ -117,7 +117,7 @@ def _change(level: Level, standard: float) -> Cell:
 
 
 def indicators(results: Results, order: Sequence[str]) -> Table | None:
-    """EUROBENCH's indicators; None where no standard pushes were played."""
+    """Return EUROBENCH's indicators; None without standard pushes."""
     columns, rows = list(SWAY), []
     for name in order:
         if (found := results.summary["controllers"][name].get("eurobench")) is None:

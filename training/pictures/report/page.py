@@ -51,15 +51,15 @@ def write_report(
     """Write the report of a finished evaluation or benchmark; returns its path.
 
     The file holds everything it shows: style, script, plots, pictures, and the numbers as CSV. The
-    same folder gives the same file. Trials that cannot be played again are left out, and the report
-    says why.
+    same folder gives the same file. Trials that cannot be simulated again are left out, and the
+    report gives the reason.
 
     Args:
         folder: written by `evaluate`.
         out: the file; `folder`/report.html if not given.
-        films: play the worst trials again, for pictures and plots over time (seconds for each).
+        films: simulate the worst trials again, for pictures and plots over time (seconds for each).
         console: where progress and the path are printed; None: nowhere.
-        allow: controllers from outside (``module:Class``) that may run; others are not played.
+        allow: controllers from outside (``module:Class``) that may run; others are not run.
 
     Raises:
         ConfigError: the folder holds no finished evaluation, or its files are not whole.
@@ -139,14 +139,14 @@ def _cases(
     cases = choose_exhibits(results, results.reference, results.summary["ranking"])
     notes: list[str] = []
     if not films:
-        notes.append("The trials were not played again: the report was asked to go without.")
+        notes.append("The trials were not simulated again: films were switched off.")
     problem = can_draw() if films and cases else None
     if problem:
         notes.append(f"There are no pictures: {problem}.")
     done: dict[tuple[int, str], Film | None] = {}
     shown = []
     for k, case in enumerate(cases, 1):
-        played = []
+        found_films: list[Film] = []
         for record in filter(None, (case.record, case.baseline)):
             key = (record.trial, record.controller)
             if films and key not in done:
@@ -156,8 +156,8 @@ def _cases(
                 done[key] = _film(results, record, times, not problem, notes, console)
             found = done.get(key)
             if found is not None:
-                played.append(found)
-        shown.append(_shown(case, played, results))
+                found_films.append(found)
+        shown.append(_shown(case, found_films, results))
     return shown, notes
 
 
@@ -175,7 +175,7 @@ def _film(
         reason = str(error)
     except Exception as error:  # a controller from outside may raise anything
         reason = raised(error)
-    note = f"{record.controller} was not played again: {reason}."
+    note = f"{record.controller} was not simulated again: {reason}."
     if note not in notes:
         notes.append(note)
         console.print(note, markup=False, highlight=False, soft_wrap=True)
@@ -190,9 +190,9 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
     # the last time worth showing
     end = (record.fall_time if record.fallen else (record.start or 0.0) + 3.0) + AFTER
     parts = []
-    for played in films:
-        who, t = played.record, played.signals.t
-        columns = played.signals.columns
+    for each in films:
+        who, t = each.record, each.signals.t
+        columns = each.signals.columns
         label = (f"Trial {who.trial}, {who.controller}: centre of mass, centre of pressure, "
                  f"capture point, angular momentum and torque over {end:.1f} s.")  # fmt: skip
         name = re.sub(r"[^\w.-]+", "-", f"trial-{who.trial}-{Path(who.controller).name}")
@@ -203,10 +203,10 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
             "name": who.controller,
             "swatch": plots.swatch(results.controllers.index(who.controller)),
             "end": _ending(who),
-            "same": played.same,
+            "same": each.same,
             "frames": [
                 (time, "data:image/webp;base64," + base64.b64encode(picture).decode())
-                for time, picture in played.frames
+                for time, picture in each.frames
             ],
             "plot": picture.svg,
             "download": signals_csv(name, t, columns),

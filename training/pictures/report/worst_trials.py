@@ -1,4 +1,4 @@
-"""The trials that a report shows are chosen and played again: frames and signals."""
+"""Choose the trials that a report shows and simulate them again: frames and signals."""
 
 import io
 import math
@@ -47,7 +47,7 @@ class Exhibit:
 
 @dataclass(frozen=True)
 class Film:
-    """A trial played again.
+    """A trial simulated again.
 
     Attributes:
         record: as recorded.

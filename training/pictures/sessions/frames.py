@@ -96,7 +96,7 @@ class Observer:
         if self._forces.simulation is not simulation:  # other conditions, another simulation
             self._forces = ContactForces(simulation)
         data, arrays = simulation.data, simulation.arrays
-        if not np.array_equal(self._surfaces, arrays.surfaces):  # an episode may draw them anew
+        if not np.array_equal(self._surfaces, arrays.surfaces):  # an episode may resample them
             self._surfaces = arrays.surfaces.copy()
         return Frame(
             time=simulation.time,
@@ -112,7 +112,7 @@ class Observer:
         )
 
     def _reference(self, time: float) -> Poses | None:
-        """The ghost's bodies at a time [s]; it stands anew where the robot has been reset."""
+        """Return the ghost's bodies at a time [s]; after a reset it stands where the robot does."""
         if time == 0.0:
             robot, seen = self._env.robot, self._seen
             self._ghost = ghost_of(self._env) if seen is None else Seen(seen, robot)

@@ -59,7 +59,7 @@ class Seen:
         self._clip, self._robot, self._data = clip, robot, mujoco.MjData(robot.model)
 
     def __call__(self, time: float) -> Poses:
-        """Where they are at a time [s]; they begin anew after the last frame."""
+        """Return their poses at a time [s]; the motion repeats after the last frame."""
         self._data.qpos[:] = self._clip.qpos[round(time / self._clip.dt) % len(self._clip.qpos)]
         mujoco.mj_kinematics(self._robot.model, self._data)
         return Poses(self._data.xpos.copy(), self._data.xquat.copy())

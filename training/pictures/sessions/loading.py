@@ -1,4 +1,4 @@
-"""From what is asked for in text to a session that can be played."""
+"""Build a session from its settings in text."""
 
 import re
 from collections.abc import Callable

@@ -11,8 +11,8 @@ from poise.envs.viewing.quantities import PUSH
 
 from .frames import Frame
 
-DURATION = 0.1  # of a push that nobody has chosen another for [s]
-WEIGHT = 0.5  # of a push that nobody has chosen another for: J/m [m/s]
+DURATION = 0.1  # of a push, by default [s]
+WEIGHT = 0.5  # of a push, by default: J/m [m/s]
 GAIN = 1.0  # [m/s] of J/m for an arrow as long as the CoM is high
 LONGEST = 2.0  # arrow over CoM height
 FLAT = 0.1  # a ray that goes down less steeply than this does not point at a place

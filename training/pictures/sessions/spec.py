@@ -16,7 +16,7 @@ from poise.training.benchmarking.trials.names import NO_CONTROL
 
 STANDING = "standing"  # the motion of a session that names none
 MOST = 3  # controllers side by side
-NOBODY = "none"  # in the place of a controller
+NO_CONTROLLER = "none"
 
 
 @dataclass(frozen=True)

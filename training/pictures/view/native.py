@@ -75,7 +75,7 @@ class NativeView:
         self._pull = found
 
     def _push(self, fields: dict[str, object]) -> None:
-        """Push the robot; a push that cannot be is told, and no end of the window."""
+        """Push the robot; print the error of an invalid push, and keep the window open."""
         try:
             self.live.push(**fields)
         except PoiseError as error:

@@ -31,7 +31,7 @@ def own_page(origin: str | None, host: str | None, loopback: bool) -> bool:
 
 
 class Visits:
-    """Who is told of a page that is opened: `opened(query)` of its address, in any thread.
+    """Called for a page that is opened: `opened(query)` with its address, in any thread.
 
     What it raises as PoiseError is the answer instead of the page.
     """
@@ -43,7 +43,7 @@ class Visits:
         """Tell of a request if it opens the page, not one of its files; what is wrong with it."""
         path, headers = urlsplit(request.path), request.headers
         page = path.path in ("/", "/index.html") and "Upgrade" not in headers
-        # a picture in somebody else's page is none that a user has opened
+        # a frame embedded in another site's page was not opened by the user
         if not page or headers.get("Sec-Fetch-Dest", "document") != "document":
             return None
         try:
@@ -57,7 +57,7 @@ class Visits:
 def own_pages_only(loopback: bool, visits: Visits) -> Iterator[None]:
     """Have servers that are started meanwhile refuse what is not of their own pages, by 403.
 
-    `visits` is told of pages that are opened; what it refuses is answered by 404.
+    `visits` is called for pages that are opened; one that it refuses is answered by 404.
 
     viser has no such setting: it calls `websockets.asyncio.server.serve`, which is wrapped here for
     as long as a server starts.

@@ -105,7 +105,7 @@ class Stage:
                 label.position = _below(frame) + up + offset
 
     def _show_ground(self, frames: Sequence[Frame]) -> None:
-        """Build what each robot stands on anew where it is another; a lane is as wide as it is."""
+        """Rebuild the ground of each robot where it changed; a lane is as wide as its ground."""
         ground = [frame.surfaces for frame in frames]
         if len(ground) == len(self._ground) and all(map(operator.is_, ground, self._ground)):
             return
