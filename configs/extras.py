@@ -8,7 +8,7 @@ from .errors import ConfigError
 
 
 def how_to_install(extra: str) -> str:
-    """The command that installs an extra such as "view", for a message or a docstring.
+    """Return the command that installs an extra such as "view", for a message or a docstring.
 
     Poise is on no index yet: it runs in the checkout that Poise is installed from.
     """

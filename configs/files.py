@@ -17,7 +17,7 @@ OTHERS = {"robots": (".xml", ".mjcf", ".urdf")}
 
 
 def packaged(kind: str) -> list[str]:
-    """Names of the packaged configurations of one kind: ``packaged("robots")``.
+    """Return names of the packaged configurations of one kind: ``packaged("robots")``.
 
     A configuration is a file, ``NAME.yaml``, or a folder, ``NAME/config.yaml`` (policies).
     """
@@ -32,7 +32,7 @@ def packaged_folder(kind: str) -> Path:
 
 
 def resolve(kind: str, name: str | Path) -> Path:
-    """The YAML file of a packaged name (``humanoid``) or of a path to a ``.yaml`` file.
+    """Return the YAML file of a packaged name (``humanoid``) or of a path to a ``.yaml`` file.
 
     Args:
         kind: folder of ``poise.configs``, such as ``robots`` or ``controllers``.

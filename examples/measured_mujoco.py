@@ -43,7 +43,7 @@ def measure() -> Measurement:
 
 
 def step(command: tuple[np.ndarray, ...]) -> Measurement:
-    """A physics step of motors that run the servo on their own encoders."""
+    """Return a physics step of motors that run the servo on their own encoders."""
     torque, target, stiffness, damping = command
     q, dq = data.qpos[dofs + 1], data.qvel[dofs]
     data.ctrl[:] = torque + stiffness * (target - q) - damping * dq

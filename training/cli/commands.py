@@ -211,7 +211,7 @@ def benchmark(
 
 
 def _raised(summary: "Summary", out: Path) -> int:
-    """The exit code: 1, with a line that tells the first error, if a controller raised."""
+    """Return the exit code: 1, with a line that tells the first error, if a controller raised."""
     if failed := sum(entry["errors"] for entry in summary["controllers"].values()):
         table = out / "trials.csv"
         with table.open(newline="", encoding="utf-8") as file:

@@ -167,7 +167,7 @@ def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
 
 
 def options(config: TrainConfig) -> list[Option]:
-    """All options: the command's own, then the fields of the configuration."""
+    """Return all options: the command's own, then the fields of the configuration."""
     helps, hints, own = sentences(Command), get_type_hints(Command), []
     for name, default in ((f.name, f.default) for f in fields(Command) if f.name != "settings"):
         kind = "" if isinstance(default, bool) else kind_of(hints[name])
@@ -192,7 +192,7 @@ def print_help(config: TrainConfig, everything: bool) -> None:
 
 
 def parse(args: Sequence[str]) -> Command:
-    """The command of these arguments, its configuration checked like one from a file."""
+    """Return the command of these arguments, its configuration checked like one from a file."""
     base, quick = train_config(_base(args)), _peek(args).quick
     with one_line_errors("poise train", [option.name for option in options(base)], args):
         command = tyro.cli(
@@ -210,7 +210,7 @@ def parse(args: Sequence[str]) -> Command:
 
 
 def _base(args: Sequence[str]) -> str | Path:
-    """The file that the flags' defaults come from, looked up before the flags are read."""
+    """Return the file that the flags' defaults come from, looked up before the flags are read."""
     known = _peek(args)
     if known.quick and (known.config is not None or known.resume):
         raise ConfigError("goes with no --config and no --resume: a quick run goes on with "
@@ -224,7 +224,7 @@ def _base(args: Sequence[str]) -> str | Path:
 
 
 def _peek(args: Sequence[str]) -> argparse.Namespace:
-    """The flags that matter by being there, which a parsed command does not tell."""
+    """Return the flags that matter by being there, which a parsed command does not tell."""
     peek = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--config", "--out", "--controller"):
         peek.add_argument(name)

@@ -82,7 +82,7 @@ def walk(
 
 
 def _terrain(text: str) -> str | dict[str, object]:
-    """A kind by its name, or the mapping that the text is as YAML.
+    """Return a kind by its name, or the mapping that the text is as YAML.
 
     Raises ConfigError for text that is no YAML, or neither of these.
     """

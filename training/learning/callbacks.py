@@ -137,7 +137,7 @@ class Checkpoints(BaseCallback):
             self._save(BEST)
 
     def _play(self) -> dict[str, float]:
-        """The deterministic policy on the held-out pushes, the same at every evaluation."""
+        """Return the deterministic policy on the held-out pushes, the same at every evaluation."""
         evaluation, batch = self.config.evaluation, self._batch
         assert batch is not None  # made at the start of the training
         normalize = self._normalize()

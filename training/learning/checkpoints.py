@@ -67,7 +67,7 @@ def save_checkpoint(
 
 
 def plain(model: PPO) -> PPO:
-    """The model with nothing in it that is defined by Poise, so that SB3 alone can load it.
+    """Return the model with nothing in it that is defined by Poise, so that SB3 alone can load it.
 
     It shares the weights. Its learning rate is the one at the start. Of a symmetric policy it is
     the ordinary one, f, whose weights these are: see `symmetry.py` for what is made of it.
@@ -138,7 +138,7 @@ def _spread(found: dict[str, np.ndarray], size: int, newest: int) -> None:
 
 
 def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
-    """The statistics that normalise observations and returns, as arrays."""
+    """Return the statistics that normalise observations and returns, as arrays."""
     arrays = {
         f"{prefix}_{name}": np.asarray(getattr(moments, name), dtype=float)
         for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms))
@@ -152,7 +152,7 @@ def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
 def widened(
     small: Mapping[str, Tensor], large: Mapping[str, Tensor], end: int | None = None
 ) -> dict[str, Tensor]:
-    """Weights of the network `large` with which it computes what `small` does.
+    """Return weights of the network `large` with which it computes what `small` does.
 
     Weights W (out, in) and biases (out,) of both, of as many layers. The units that are new keep
     what comes in as initialised in `large`; nothing goes out of them yet: their columns are zero.

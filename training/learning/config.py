@@ -215,7 +215,7 @@ class TrainConfig:
         return self.make_env(robot, **{"observation": self.env.observation, **overrides})
 
     def make_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
-        """The environment of this run; `overrides` replace its arguments or fields of `env`.
+        """Return the environment of this run; `overrides` replace its arguments or fields of `env`.
 
         A loaded `robot` spares loading it again. What the critic alone sees is left out. Raises
         ConfigError for a controller from outside that the user has not allowed, see `allowing`.
@@ -264,7 +264,7 @@ class TrainConfig:
 
 
 def train_config(name_or_path: str | Path) -> TrainConfig:
-    """A packaged training configuration (`configs/training`) or a path to one.
+    """Return a packaged training configuration (`configs/training`) or a path to one.
 
     `base` in it names another one, whose fields hold where it has none of its own. Raises
     ConfigError naming the file, the field and the choices.

@@ -118,7 +118,7 @@ def train(
 
 
 def first_policy(name: str | None) -> Path | PolicyFileConfig | None:
-    """The policy that a new run begins with: a folder, one from outside, or None.
+    """Return the policy that a new run begins with: a folder, one from outside, or None.
 
     Raises ConfigError for a name of neither, and for a controller that is no policy.
     """
@@ -251,7 +251,7 @@ def _env_seed(seed: int) -> int:
 
 
 def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
-    """The checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
+    """Return the checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
     check_out_folder(out)
     try:
         str(out).encode()

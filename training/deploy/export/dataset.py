@@ -86,7 +86,7 @@ def write_dataset(
 
 
 def _episode(agent: Agent, trial: Trial, buffer: Any) -> Any:
-    """A trial as a buffer of Minari."""
+    """Return a trial as a buffer of Minari."""
     env = agent.env
     observation, info = env.reset(seed=trial.seed, options=trial.options)
     if agent.begin is not None:

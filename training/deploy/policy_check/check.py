@@ -111,7 +111,7 @@ def _holds(config: PolicyFileConfig) -> bool:
 
 
 def known_as(path: Path) -> str | None:
-    """The public policy that a network is, by its sum."""
+    """Return the public policy that a network is, by its sum."""
     digest(path, path)  # of a pointer of Git LFS, or without its data, that is said
     found = hashlib.sha256(read_bytes(path, BYTES)).hexdigest()
     for known in known_policies():

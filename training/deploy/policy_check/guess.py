@@ -74,7 +74,7 @@ class Layout:
 
 
 def network_sizes(path: Path) -> Sizes:
-    """The sizes of a network; TorchScript, which is code, must have been allowed.
+    """Return the sizes of a network; TorchScript, which is code, must have been allowed.
 
     Raises ConfigError as `onnx_session` and `check_allowed` do.
     """

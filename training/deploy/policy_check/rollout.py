@@ -51,7 +51,7 @@ class Finding:
 def read_rollout(
     path: Path, inputs: Sequence[str] = ("",), memories: Sequence[str] = ()
 ) -> Rollout:
-    """The arrays of an .npz file: `observations` and `actions`, and what else it has.
+    """Return the arrays of an .npz file: `observations` and `actions`, and what else it has.
 
     `qpos` and `qvel` are the states. Of a network that remembers the file may hold each memory
     before each step, by its name; of one with several inputs it holds each of them by its name in
@@ -94,7 +94,7 @@ def compare(policy: PolicyFile, source: Path) -> list[Finding]:
 
 
 def _network(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
-    """Whether the network answers as it did, and remembers what it did."""
+    """Yield whether the network answers as it did, and remembers what it did."""
     network, worst = policy.network, 0.0
     apart = dict.fromkeys(rollout.memories, 0.0)
     network.reset()
@@ -121,7 +121,7 @@ def _network(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
 
 
 def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
-    """Each term of the observation, at the first place of each age."""
+    """Yield each term of the observation, at the first place of each age."""
     for name, places in policy.observer.places().items():
         for place in places:
             where = f"{place.term.term} at {place.start}:{place.start + place.size}"
@@ -134,7 +134,7 @@ def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
 def _judged(
     place: Place, name: str, policy: PolicyFile, rollout: Rollout
 ) -> tuple[bool | None, str]:
-    """Whether a term of an input is right, and what was found of it."""
+    """Return whether a term of an input is right, and what was found of it."""
     observed = rollout.observations[name][place.age + 1 :]
     shown = observed[:, place.start : place.start + place.size]
     expected = _expected(place, policy, rollout)
@@ -173,7 +173,7 @@ def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray 
 
 
 def _lies(expected: np.ndarray, observations: np.ndarray) -> int | None:
-    """The place at which a term lies in the observations; None where it lies nowhere."""
+    """Return the place at which a term lies in the observations; None where it lies nowhere."""
     size = expected.shape[1]
     moves = np.ptp(expected, axis=0).max() > CLOSE  # constants lie everywhere
     for start in range(observations.shape[1] - size + 1) if moves else ():

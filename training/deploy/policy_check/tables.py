@@ -88,7 +88,7 @@ def print_check(check: PolicyCheck, console: Console) -> None:
 
 
 def _how(stood: Stood, seconds: float) -> str:
-    """How it stood, for so many seconds."""
+    """Return how it stood, for so many seconds."""
     if stood.fell is not None:
         return f"fell after {stood.fell:.2f} s"
     return (f"stood for {seconds:g} s, {'at rest' if stood.rests else 'never at rest'}, "
@@ -123,7 +123,7 @@ def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:
 
 
 def _skeleton(check: PolicyCheck) -> str:
-    """A description with places to fill in."""
+    """Return a description with places to fill in."""
     lines = ["kind: policy-file", f"policy: {check.file.rpartition('/')[2]}"]
     lines += [f"{name}: ...  # {WORDS[name]}" for name in check.unsaid if name != "observations"]
     if check.sizes.gives_clip:

@@ -103,7 +103,7 @@ def _holding(holding: Holding) -> str:
 
 
 def _directions(check: RobotCheck) -> Table:
-    """Every other direction, and the mean over all."""
+    """Return every other direction, and the mean over all."""
     headings = ("direction", "CoM to edge [mm]", "CoP by ankles [mm]", "in place [N·s]",
                 "in place [N·s/kg]", "one step ≤ [N·s]", "one step ≤ [N·s/kg]")  # fmt: skip
     rows = (

@@ -18,7 +18,7 @@ HEAD = "# Guessed by poise robot from {path}: correct what is wrong; all fields:
 
 
 def load_and_write(name: str) -> tuple[Robot, Path | None]:
-    """The robot of a name, and the file of its description that was written for it, if any.
+    """Return the robot of a name, and the file of its description that was written for it, if any.
 
     A model without a description gets one in the current folder, under the model's name, unless
     that file exists: it may have been edited. An error then names what is missing in it, such as

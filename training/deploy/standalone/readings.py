@@ -100,7 +100,7 @@ class Measurement:
     contacts: Sequence[bool] | np.ndarray
 
     def check(self, robot: Robot) -> dict[str, np.ndarray]:
-        """Every field as numbers; raises ConfigError naming what is missing or no number."""
+        """Return every field as numbers; raises ConfigError naming what is missing or no number."""
         source, names = "measurement", robot.joint_names
         return {
             "attitude": self._axes(source),
@@ -130,7 +130,7 @@ class Measurement:
 def joint_numbers(
     values: ArrayLike | Mapping[str, float], names: Sequence[str], field: str, source: str = SOURCE
 ) -> np.ndarray:
-    """(nj,) finite numbers, given in the order of `names` or by name; else ConfigError."""
+    """Return (nj,) finite numbers, given in the order of `names` or by name; else ConfigError."""
     if not isinstance(values, Mapping):
         return numbers(values, len(names), field, source)
     if missing := [name for name in names if name not in values]:
@@ -142,7 +142,7 @@ def joint_numbers(
 
 
 def numbers(values: object, count: int, field: str, source: str = SOURCE) -> np.ndarray:
-    """(`count`,) finite numbers; else ConfigError."""
+    """Return (`count`,) finite numbers; else ConfigError."""
     found = finite_array(values, (count,))
     if found is None:
         raise ConfigError(f"must be {count} finite numbers", source=source, field=field)
@@ -150,7 +150,7 @@ def numbers(values: object, count: int, field: str, source: str = SOURCE) -> np.
 
 
 def unit_quaternion(values: object, field: str, source: str = SOURCE) -> np.ndarray:
-    """(4,) of length 1, w first; else ConfigError."""
+    """Return (4,) of length 1, w first; else ConfigError."""
     turn = numbers(values, 4, field, source)
     if abs(float(np.linalg.norm(turn)) - 1.0) > 1e-3:
         raise ConfigError("must be a quaternion of length 1", source=source, field=field)

@@ -37,7 +37,7 @@ class MotorCommand(NamedTuple):
     def targets(
         self, q: np.ndarray, dq: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
     ) -> MotorCommand:
-        """The same command for motors that take targets and no torques.
+        """Return the same command for motors that take targets and no torques.
 
         Gains K', D' take the place of none, and the target q' that of the torque:
         K' (q' − q) − D' q̇ = τ at the readings q, q̇ of the motors; when these have moved on, the
@@ -72,7 +72,7 @@ class MeasuredState(EstimatedState):
 
     @classmethod
     def instead_of(cls, source: EstimatedState) -> MeasuredState:
-        """The same of the plant and the estimator of `source`."""
+        """Return the same of the plant and the estimator of `source`."""
         config = source.config
         if config.kind == "exact":
             reason = "exact is the true state, which no sensor measures"
@@ -199,7 +199,7 @@ class SensedController(OutsideController):
 
 
 def typical(level: Realism) -> Realism:
-    """The level with the middle of each range in its place."""
+    """Return the level with the middle of each range in its place."""
     parts = {}
     for name in PARTS[1:]:
         part = getattr(level, name)

@@ -18,11 +18,11 @@ class Pace:
         self.each = (time.monotonic() - self.started) / self.done  # [s]
 
     def allows_another(self) -> bool:
-        """True for the first generation, and for one that would end in time."""
+        """Return True for the first generation, and for one that would end in time."""
         return self.done == 0 or (self.done + 1) * self.each <= self.seconds
 
     def words(self, left: int) -> str:
-        """The end of a line: how long a generation takes, and all that are `left`."""
+        """Return the end of a line: how long a generation takes, and all that are `left`."""
         text, seconds = f"; {self.each:.1f} s each", left * self.each
         if left and self.allows_another():
             text += f", {min(seconds, self.seconds - self.done * self.each) / 60.0:.1f} min left"

@@ -112,7 +112,7 @@ def tune(
 
 
 def _known(config: TuneConfig, out: Path, resume: bool) -> list[Generation]:
-    """The generations that an earlier call has tried."""
+    """Return the generations that an earlier call has tried."""
     check_resume(out, resume, is_file(out / CONFIG), "a search", "search")
     if not resume:
         return []
@@ -152,7 +152,7 @@ class _Search:
         self.centres: list[np.ndarray] = []
 
     def step(self, executor: Executor) -> Generation:
-        """A generation; returns its line of the history."""
+        """Return a generation; returns its line of the history."""
         config, limits = self.config, self.limits
         units = [np.asarray(u) for u in self.cma.ask()]
         seeds = [config.seed + 100_000 * (2 * self.generation + k + 1) for k in range(2)]
@@ -190,7 +190,7 @@ class _Search:
         self._take(units, row)
 
     def _are_worths(self, values: list[list[float]]) -> bool:
-        """True if these are values of all candidates and tasks, or of no tasks."""
+        """Return True if these are values of all candidates and tasks, or of no tasks."""
         found = np.asarray(values, float)
         trials = len(self.limits[0]) * len(self.config.tasks.levels)
         sizes = [(self.config.population, count) for count in (0, trials)]
@@ -216,7 +216,7 @@ class _Search:
         self.generation += 1
 
     def words(self, row: Generation) -> str:
-        """A line for the terminal."""
+        """Return a line for the terminal."""
         text = f"generation {self.generation} of {self.config.generations}"
         text += f": score {self.scores.mean():.2f}, best {self.scores.max():.2f}"
         agents = ("alone", row["alone"]), (f"under {self.config.policy}", row["below"])

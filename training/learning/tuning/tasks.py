@@ -40,11 +40,11 @@ class TuningPushes:
         _check_levels(self.levels)
 
     def first(self, robot: Robot) -> np.ndarray:
-        """The limit of each direction in the first generation [N·s]."""
+        """Return the limit of each direction in the first generation [N·s]."""
         return np.full(len(self.directions), self.impulse * robot.mass)
 
     def draw(self, seed: int, robot: Robot, limits: np.ndarray) -> list[Trial]:
-        """Trials, direction by direction; directions are jittered, so that all angles occur.
+        """Return trials, direction by direction; directions are jittered, so that all angles occur.
 
         `limits` [N·s] has one for each.
         """

@@ -163,7 +163,7 @@ def performer(
     tempo: Tempo | None = None,
     realism: str | Path | None = None,
 ) -> Agent:
-    """An agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
+    """Return an agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
 
     `fall` are its `FallLimits`; by default lower than the motion ever is, or further from upright.
 

@@ -59,7 +59,7 @@ class Commands:
     commands: tuple[Command, ...]
 
     def __call__(self, time: float) -> Command:
-        """The command at a time [s]."""
+        """Return the command at a time [s]."""
         return self.commands[bisect_right(self.times, time + 1e-9)]
 
 
@@ -143,14 +143,14 @@ def print_matched(
 
 
 def _said(command: Command) -> str:
-    """A command in words, without what it leaves out."""
+    """Return a command in words, without what it leaves out."""
     others = ((command.left, "m/s left"), (command.turning, "rad/s"))
     said = [f"{value:.2f} {unit}" for value, unit in others if abs(value) >= 0.005]
     return ", ".join([f"{command.forward:.2f} m/s", *said])
 
 
 def _place(database: MatchingDatabase, names: Sequence[str], text: str) -> tuple[int, int]:
-    """The number of a clip and of a frame in it."""
+    """Return the number of a clip and of a frame in it."""
     name, at, seconds = text.rpartition("@")
     known = {name: i for i, name in enumerate(names)}
     try:

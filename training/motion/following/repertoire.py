@@ -44,14 +44,14 @@ def kept(folder: Path, name: str) -> Path:
 
 
 def is_clip(name: str) -> bool:
-    """True for what is a robot's postures, or becomes that; false for keyframes."""
+    """Return True for what is a robot's postures, or becomes that; false for keyframes."""
     return name in known_clips() or Path(name).suffix.lower() in (".npz", ".bvh")
 
 
 def load_repertoire(
     names: Sequence[str], labels: Sequence[str], robot: Robot, folder: Path, fresh: bool = False
 ) -> Repertoire:
-    """The motions of these `names`, called `labels`.
+    """Return the motions of these `names`, called `labels`.
 
     A packaged clip is retargeted to the robot, which takes about a second, unless `folder` has
     kept it; with `fresh` it is retargeted again. So is a ``.bvh`` file. A ``.npz`` file is the
@@ -76,7 +76,7 @@ def load_repertoire(
 
 
 def _clip(name: str, robot: Robot, stored: Path, fresh: bool) -> RobotClip:
-    """The robot's postures of a packaged clip, a .bvh or a .npz file."""
+    """Return the robot's postures of a packaged clip, a .bvh or a .npz file."""
     if Path(name).suffix == ".npz":
         return read_robot_clip(name)
     if name in known_clips() and is_file(stored) and not fresh:

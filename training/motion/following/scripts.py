@@ -33,7 +33,7 @@ def open_synthesis(
     least: float | None = None,
     script: Script | None = None,
 ) -> Synthesis:
-    """The clips of a graph, or the packaged ones, ready for scripts.
+    """Return the clips of a graph, or the packaged ones, ready for scripts.
 
     For a robot packaged motions with steps are loaded where the script names them: in the ways of
     others they have no place.
@@ -86,7 +86,7 @@ def open_synthesis(
 def load_clips(
     files: Sequence[str], robot: Robot | None, names: Sequence[str] | None = None
 ) -> list[tuple[GraphClip, Clip]]:
-    """The clips of files with what a graph keeps of them; see `load_clip`."""
+    """Return the clips of files with what a graph keeps of them; see `load_clip`."""
     loaded = []
     for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
         clip, digest = load_clip(file, robot)
@@ -95,7 +95,7 @@ def load_clips(
 
 
 def _beside(file: str, graph_file: Path) -> str:
-    """A clip's file, looked for beside the graph's file too."""
+    """Return a clip's file, looked for beside the graph's file too."""
     beside = graph_file.parent / file
     return str(beside) if Path(file).suffix and not is_file(file) and is_file(beside) else file
 

@@ -41,7 +41,7 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
 
 
 def _unit(metres: float) -> str:
-    """The unit of a file, by name where it has one."""
+    """Return the unit of a file, by name where it has one."""
     named = [name for name, length in UNITS.items() if abs(length / metres - 1.0) < 1e-9]
     return f"{named[0]} ({metres:g} m)" if named else f"{metres:.4g} m, so that legs are {LEG} m"
 

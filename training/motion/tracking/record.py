@@ -135,7 +135,7 @@ class Footing:
 
 
 def lies(env: ResidualBalanceEnv) -> bool:
-    """True if the CoM is too low or the root leans too far for the motion at this time."""
+    """Return True if the CoM is too low or the root leans too far for the motion at this time."""
     state, limits = env.simulation.state, FallLimits()
     sample = env.motion.sample(env.motion_time)
     low = state.com[2] - state.origin[2] < limits.height * sample.com_offset[2]

@@ -106,7 +106,7 @@ def polar_envelope(
 
 
 def right_angle(direction: float) -> str:
-    """The name of a right angle, such as "left" for 90; degrees for all others."""
+    """Return the name of a right angle, such as "left" for 90; degrees for all others."""
     angle = round(direction)
     return towards(angle) if angle in range(0, 360, 90) else f"{direction:g}°"
 

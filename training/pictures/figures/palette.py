@@ -27,7 +27,7 @@ NAMES = {to_hex(colour): name for name, colour in reversed(DRAWN.items())} | {
 
 
 def themed(colour: Sequence[float]) -> str:
-    """A colour of a picture as the style sheet's variable, if one stands for it."""
+    """Return a colour of a picture as the style sheet's variable, if one stands for it."""
     red, green, blue = colour[:3]
     value = to_hex((red, green, blue))
     return f"var(--{NAMES[value]})" if value in NAMES else value
@@ -62,6 +62,6 @@ def luminance(colour: RGB) -> float:
 
 
 def linear_rgb(colour: Sequence[float]) -> np.ndarray:
-    """An sRGB colour (3,) as light adds up; both of 0 to 1."""
+    """Return an sRGB colour (3,) as light adds up; both of 0 to 1."""
     c = np.asarray(colour, dtype=float)
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)

@@ -65,7 +65,7 @@ def series(name: str, index: int, rows: Sequence[ArrayLike]) -> Series:
 def rate_series(
     name: str, index: int, x: Sequence[float], counts: Sequence[tuple[int, int]]
 ) -> Series:
-    """Rates with Wilson intervals from (successes, trials) at each x."""
+    """Return rates with Wilson intervals from (successes, trials) at each x."""
     return series(name, index, [
         (place, won / trials, *wilson_interval(won, trials))
         for place, (won, trials) in zip(x, counts, strict=True)
@@ -83,7 +83,7 @@ def draw_marks(
     ax: Axes, s: Series, tips: str, *, x: np.ndarray | None = None, across: bool = False,
     bars: bool = True, reach: float = 0.0,
 ) -> float:  # fmt: skip
-    """The marks of a series, with the intervals as bars; bounds are hollow, with an arrow.
+    """Return the marks of a series, with the intervals as bars; bounds are hollow, with an arrow.
 
     Args:
         ax: of the picture; a polar one has x as its angle [rad].

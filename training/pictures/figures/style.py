@@ -133,13 +133,13 @@ def saved_figure(out: Out, width: float, height: float) -> Iterator[Figure]:
 
 
 def sample(colour: str, line: object = "", marker: Any = "") -> Markup:
-    """How a line with its marks looks, for a legend of a page; its name stands beside it."""
+    """Return how a line with its marks looks, for a legend of a page; its name stands beside it."""
     return _sample(Line2D([1, 15, 29], [6] * 3, color=colour, ls=line, lw=1.9,
                           marker=marker, markevery=[1]))  # fmt: skip
 
 
 def area_sample(**look: Any) -> Markup:
-    """How an area of this look is filled, for a legend of a page."""
+    """Return how an area of this look is filled, for a legend of a page."""
     return _sample(Rectangle((5, 1), 20, 10, **look))
 
 

@@ -210,7 +210,7 @@ def _film(
 
 
 def _labelled(name: str, episode: Episode) -> np.ndarray:
-    """The episode's picture with its name, and how it ended."""
+    """Return the episode's picture with its name, and how it ended."""
     from PIL import Image, ImageDraw, ImageFont
 
     picture = Image.fromarray(episode.frame)

@@ -117,12 +117,12 @@ def choose(results: Results, names: Sequence[str], sizes: int) -> list[Record]:
 
 
 def sector(direction: float) -> int:
-    """The middle of the sector of a direction [deg]."""
+    """Return the middle of the sector of a direction [deg]."""
     return round(SECTOR * (round(direction / SECTOR) % (360.0 / SECTOR)))
 
 
 def packed(frames: Sequence[Frame], push: Push) -> dict[str, Any]:
-    """Frames from just before a push on, `RATE` a second, as base64 of little-endian int16.
+    """Return frames from just before a push on, `RATE` a second, as base64 of little-endian int16.
 
     Each frame has all bodies but the world: x, y, z in millimetres, then the quaternion w, x, y, z
     times 32767; `bodies` is how many, `frames` how many frames there are.

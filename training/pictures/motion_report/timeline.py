@@ -82,7 +82,7 @@ def _timeline(parts: Sequence[Part], duration: float, trace: Trace | None) -> In
 
 
 def layers_of(what: str) -> list[str]:
-    """The terms of an overlay, the base first; of anything else the name alone."""
+    """Return the terms of an overlay, the base first; of anything else the name alone."""
     try:
         sequence = parse(what).sequence
     except ConfigError:  # the name of a clip with other characters

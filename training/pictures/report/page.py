@@ -75,7 +75,7 @@ def write_report(
 
 
 def render(results: Results, *, films: bool = True, console: Console | None = None) -> str:
-    """The page; raises ConfigError where the summary does not hold what it should."""
+    """Return the page; raises ConfigError where the summary does not hold what it should."""
     console = console or Console(quiet=True)
     baseline = results.reference
     order = results.summary["ranking"]
@@ -135,7 +135,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
 def _cases(
     results: Results, films: bool, console: Console
 ) -> tuple[list[dict[str, object]], list[str]]:
-    """The trials shown, and what to say of those that are not."""
+    """Return the trials shown, and what to say of those that are not."""
     cases = choose_exhibits(results, results.reference, results.summary["ranking"])
     notes: list[str] = []
     if not films:
@@ -183,7 +183,7 @@ def _film(
 
 
 def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, object]:
-    """A case for the template."""
+    """Return a case for the template."""
     record = case.record
     trial = results.trial(record)
     pushes = [(push.start, push.duration) for push in trial.pushes]
@@ -234,7 +234,7 @@ def _ending(record: Record) -> str:
 
 
 def _facts(results: Results) -> list[tuple[str, str]]:
-    """The origin of the result."""
+    """Return the origin of the result."""
     summary, settings = results.summary, results.settings
     machine, versions = summary["machine"], summary["versions"]
     rows = [
@@ -255,6 +255,6 @@ def _facts(results: Results) -> list[tuple[str, str]]:
 
 
 def _file(results: Results, name: str, most: int) -> Download:
-    """A file of the folder, packed where it is long."""
+    """Return a file of the folder, packed where it is long."""
     text = read_text(results.folder / name, most)
     return download(name, text, pack=len(text) > EMBEDDED)

@@ -31,7 +31,7 @@ NONE = (np.nan, np.nan)
 
 
 def swatch(index: int) -> Markup:
-    """How series number `index` looks, for a legend."""
+    """Return how series number `index` looks, for a legend."""
     return sample(*look(index))
 
 
@@ -66,7 +66,7 @@ def forests(results: Results) -> list[Markup]:
 
 
 def envelopes(results: Results) -> tuple[Markup | None, list[tuple[str, Markup]]]:
-    """All envelopes in one picture, and each in one of its own, the best first.
+    """Return all envelopes in one picture, and each in one of its own, the best first.
 
     None and nothing where no suite measured directions.
     """
@@ -130,7 +130,7 @@ def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
 
 
 def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]]]:
-    """The picture of a part, and the bins of each controller.
+    """Return the picture of a part, and the bins of each controller.
 
     Pushes by direction are measured by the ankle limit, as the summary has it.
     """

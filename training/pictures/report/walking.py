@@ -38,7 +38,7 @@ MOTION = Text("motion", "motion")
 
 
 def walk_table(results: Results, order: Sequence[str]) -> Table | None:
-    """Every command of every controller: falls, and what was reached; None without walks."""
+    """Return every command of every controller: falls, and what was reached; None without walks."""
     caption = "What was reached of every command, pushed or not: means over trials."
     columns = (*WALK, *FALLS, *STEPS[:2], *FOLLOWED)
     return entry_table("walks", caption, columns, _walks(results, order))
@@ -52,7 +52,7 @@ def cost_table(results: Results, order: Sequence[str]) -> Table | None:
 
 
 def _walks(results: Results, order: Sequence[str]) -> list[Entry]:
-    """An entry for each command."""
+    """Return an entry for each command."""
     return [
         {**each, "part": PARTS.get(each["part"], each["part"]), "level": _words(each["level"])}
         for each in entries_of(results, order, "walks")
@@ -60,7 +60,7 @@ def _walks(results: Results, order: Sequence[str]) -> list[Entry]:
 
 
 def motion_table(results: Results, order: Sequence[str]) -> Table | None:
-    """Every motion and share of every controller; None where no motion was performed."""
+    """Return every motion and share of every controller; None where no motion was performed."""
     caption = "Falls and errors of every motion, by the share of J50 that it was pushed by."
     share = Figure("share", "push", "g", words="of the controller's J50")
     columns = (CONTROLLER, MOTION, share, *FALLS[:2], FELL, *PERFORMED)

@@ -91,7 +91,7 @@ class Observer:
         self._surfaces = LEVEL
 
     def __call__(self, fall_time: float | None = None) -> Frame:
-        """The frame of this moment, of a robot that fell at `fall_time` [s]."""
+        """Return the frame of this moment, of a robot that fell at `fall_time` [s]."""
         simulation = self._env.simulation
         if self._forces.simulation is not simulation:  # other conditions, another simulation
             self._forces = ContactForces(simulation)
@@ -131,7 +131,7 @@ class Observer:
 
 
 def ground_at(point: np.ndarray, surfaces: np.ndarray, floor: float) -> np.ndarray:
-    """(3,) the ground at the x and y of `point` [m]; surfaces and floor as of a `Frame`."""
+    """Return (3,) the ground at the x and y of `point` [m]; surfaces and floor as of a `Frame`."""
     x, y = float(point[0]), float(point[1])
     return np.array([x, y, height_at([Surface(*row) for row in surfaces.tolist()], floor, x, y)])
 

@@ -37,7 +37,7 @@ class Ghost:
         return Poses(*self._bodies.poses(time, self._soles(time)))
 
     def posture(self, time: float) -> np.ndarray:
-        """(nq,) its posture at a time [s] of the motion."""
+        """Return (nq,) its posture at a time [s] of the motion."""
         self._bodies.at(time, self._soles(time))
         return self._bodies.posture
 
@@ -66,7 +66,7 @@ class Seen:
 
 
 def ghost_of(env: BalanceEnv) -> Ghost | None:
-    """The ghost of the motion in an environment that has just been reset.
+    """Return the ghost of the motion in an environment that has just been reset.
 
     None where there is no motion, or it only stands.
     """

@@ -168,7 +168,7 @@ Play = Live | Recorded  # something with a timeline
 
 
 def _push_text(push: Push) -> str:
-    """A push as `--push` takes it, without what has its default."""
+    """Return a push as `--push` takes it, without what has its default."""
     x, y, z = push.point
     return _mapping(
         impulse=push.impulse,
@@ -183,11 +183,11 @@ def _push_text(push: Push) -> str:
 
 
 def _command_text(command: TimedCommand) -> str:
-    """A command as `--command` takes it, without what has its default."""
+    """Return a command as `--command` takes it, without what has its default."""
     return _mapping(**{name: value or None for name, value in asdict(command).items()})
 
 
 def _mapping(**fields: object) -> str:
-    """A YAML mapping on one line, of what is not None."""
+    """Return a YAML mapping on one line, of what is not None."""
     given = {name: value for name, value in fields.items() if value is not None}
     return "{" + ", ".join(f"{name}: {value}" for name, value in given.items()) + "}"

@@ -49,7 +49,7 @@ class Recorder:
 def recorded_trial(
     folder: Path, trial: int, controllers: Sequence[str] = (), allow: str | Iterable[str] = ()
 ) -> tuple[Recorded, list[str]]:
-    """A trial by up to three of the controllers that took part, side by side.
+    """Return a trial by up to three of the controllers that took part, side by side.
 
     A trial that a robot fell in is over for it; it goes to the ground, and stays as it lies there.
 

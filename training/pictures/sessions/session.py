@@ -188,7 +188,7 @@ def load_session(
     motion: ReferenceMotion | None = None,
     realism: str = IDEAL,
 ) -> Session:
-    """A session of these controllers in the standard conditions of an evaluation.
+    """Return a session of these controllers in the standard conditions of an evaluation.
 
     With a motion all perform it; to be lower than it ever is is a fall, or further from upright.
 
@@ -206,7 +206,7 @@ def load_player(
     duration: float,
     realism: str = IDEAL,
 ) -> Agent:
-    """A controller of a session that lasts `duration` [s]; errors as of `load_session`."""
+    """Return a controller of a session that lasts `duration` [s]; errors as of `load_session`."""
     if motion is None:
         level = load_realism(realism)
         return load_agent(name, robot, duration=duration, pushes=None, realism=level)

@@ -167,7 +167,7 @@ def read_link(query: str, now: Spec, names: Collection[str]) -> Spec | None:
 
 
 def _number(text: str, field: str) -> int:
-    """A whole number of at most nine digits."""
+    """Return a whole number of at most nine digits."""
     if not (text.isascii() and text.isdigit() and len(text) < 10):
         raise ConfigError(f"must be a whole number, not {shown(text)}", field=field)
     return int(text)

@@ -249,7 +249,7 @@ class BrowserView:
             self.push(self._push_of(pulled))
 
     def _push_of(self, pulled: Pull) -> dict[str, object]:
-        """The push that the arrow of the mouse is."""
+        """Return the push that the arrow of the mouse is."""
         return pulled.fields(self.play.robot, self.play.yaw, float(self.panel.duration.value))
 
     def show(self, quantity: Quantity, shown: bool) -> None:

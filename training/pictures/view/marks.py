@@ -106,7 +106,7 @@ def linear(colour: tuple[float, ...]) -> np.ndarray:
 
 
 def _along(vector: np.ndarray) -> np.ndarray:
-    """A quaternion (4,), w first, that turns the z axis towards `vector` (3,)."""
+    """Return a quaternion (4,), w first, that turns the z axis towards `vector` (3,)."""
     quaternion = NO_TURN.astype(float)
     if vector.any():
         mujoco.mju_quatZ2Vec(quaternion, vector)

@@ -82,7 +82,7 @@ class NativeView:
             print(error)
 
     def _pulled(self, viewer: Viewer) -> Pull | None:
-        """The body that MuJoCo's window drags, if it is one of the robot's."""
+        """Return the body that MuJoCo's window drags, if it is one of the robot's."""
         perturb, data = viewer.handle.perturb, self.live.session.sides[0].env.data
         body = int(perturb.select)
         if not perturb.active & int(mujoco.mjtPertBit.mjPERT_TRANSLATE) or body < 1:

@@ -19,7 +19,7 @@ Answer = Callable[["ServerConnection", "Request"], "Response | None"]
 
 
 def own_page(origin: str | None, host: str | None, loopback: bool) -> bool:
-    """Whether a request comes from a page of the server that it asks.
+    """Return whether a request comes from a page of the server that it asks.
 
     A browser names the page in `origin` and the server in `host`; a program that is no browser
     names no page. At a loopback address the server has a name of this machine alone: another one

@@ -76,7 +76,7 @@ def send_picture(server: viser.ViserServer, client: int, background: tuple[int, 
 
 
 def png(drawn: np.ndarray, background: tuple[int, int, int]) -> bytes:
-    """A picture (h, w, 4) uint8 on a background, as the bytes of a file."""
+    """Return a picture (h, w, 4) uint8 on a background, as the bytes of a file."""
     picture = Image.fromarray(np.ascontiguousarray(drawn), "RGBA")
     whole = Image.new("RGBA", picture.size, (*background, 255))
     whole.alpha_composite(picture)

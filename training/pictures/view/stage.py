@@ -174,7 +174,7 @@ class Stage:
 
 
 def _below(frame: Frame) -> np.ndarray:
-    """(3,) the ground below the centre of mass [m]."""
+    """Return (3,) the ground below the centre of mass [m]."""
     return ground_at(frame.com, frame.surfaces, frame.floor)
 
 

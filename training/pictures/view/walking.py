@@ -117,7 +117,7 @@ class WalkSliders:
 
 
 def _ends(name: str, reach: Reach | None) -> tuple[float, float]:
-    """The least and the most of a slider, which are multiples of its step."""
+    """Return the least and the most of a slider, which are multiples of its step."""
     _, least, most, step, unit = SLIDERS[name]
     low, high = getattr(reach, name, (-math.inf, math.inf))
     least = max(least, low / unit, LEAST.get(name, -math.inf))

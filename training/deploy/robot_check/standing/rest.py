@@ -74,6 +74,6 @@ def stand_at_rest(robot: Robot) -> Rest:
 
 
 def _places(env: ResidualBalanceEnv) -> np.ndarray:
-    """(1 + feet, 2) the CoM and the soles from above [m]."""
+    """Return (1 + feet, 2) the CoM and the soles from above [m]."""
     state = env.simulation.state
     return np.vstack([state.com[:2], state.sole_points[:, :2]])
