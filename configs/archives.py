@@ -1,4 +1,4 @@
-"""Archives that anybody may have written, unpacked within bounds: zip files, and arrays in them."""
+"""Untrusted archives, unpacked within bounds: zip files, and arrays in them."""
 
 import io
 import zipfile

@@ -1,4 +1,4 @@
-"""Files that anybody may have written, read within bounds.
+"""Untrusted files, read within bounds.
 
 What comes back are plain values; everything else is a ConfigError of one line, naming the file:
 a file that is missing, too large, no file at all, or not what it should be.

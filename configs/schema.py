@@ -94,7 +94,7 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
 
 
 def checked(hint: type[T], data: Any, source: str | Path) -> T:
-    """Plain values as a type hint describes them, checked as :func:`build` does.
+    """Return plain values as a type hint describes them, checked as :func:`build` does.
 
     The hint may also hold TypedDicts. Their unknown keys are kept as they are: whoever wrote the
     file may know more.
@@ -140,7 +140,7 @@ def _is_omitted(field: dataclasses.Field[Any], obj: object) -> bool:
 
 
 def to_yaml(obj: Any) -> str:
-    """YAML text of :func:`to_dict`, fields in their own order; :func:`read_yaml` reads it back."""
+    """Return the YAML text of :func:`to_dict`, fields in order; :func:`read_yaml` reads it."""
     return yaml.safe_dump(to_dict(obj), sort_keys=False, allow_unicode=True, width=100)
 
 

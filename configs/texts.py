@@ -1,4 +1,4 @@
-"""Texts that anybody may have written, as they are in pages, Markdown and terminals.
+"""Untrusted texts, shown verbatim in pages, Markdown and terminals.
 
 A name may come from an untrusted file, folder or result. Where it goes into Markdown it is
 `plain` or `code`; Rich's tables take it escaped (`rich.markup.escape`), templates of pages escape

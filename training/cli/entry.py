@@ -34,7 +34,7 @@ HELP = ("-h", "--help", "--help-all")
 ALONE = ("--help", "--version", "--print-completion")  # options without a command
 USAGE = """usage: poise COMMAND [OPTIONS]
 
-Keep a simulated humanoid on its feet while it is pushed. Begin with: poise demo.
+Keep a simulated humanoid on its feet while it is pushed. Start with: poise demo.
 poise COMMAND --help tells of a command, poise --version which version this is.
 """
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk

@@ -65,14 +65,14 @@ class Command:
         config: Packaged training configuration (see poise list) or a .yaml file; the options below
             replace its fields. If not given: residual-torque, with another --robot any-robot, with
             --resume the run's own.
-        quick: Train a first policy in some ten minutes: the configuration quick.
-        realism: How real the robot is: ideal (its state is known exactly and at once), lab, field,
-            or a .yaml file of a level; that of the configuration if not given.
-        resume: Go on with the run, or the runs, that the folder holds.
+        quick: Train a first policy in about ten minutes: the configuration quick.
+        realism: Realism level: ideal (an exact, undelayed state), lab, field, or a .yaml file; that
+            of the configuration if not given.
+        resume: Continue the run, or the runs, in the folder.
         seeds: Train a run for each of these seeds, in folders seed-SEED of the folder.
-        backend: What the runs of several seeds go on: processes of this machine (local), the same
-            by joblib, or a cluster (ray).
-        workers: How many of the runs of several seeds go on at a time; all cores if not given.
+        backend: Where the runs of several seeds execute: processes of this machine (local), the
+            same by joblib, or a cluster (ray).
+        workers: Number of concurrent runs of several seeds; all cores if not given.
         allow: What may run though a file names it: module:Class or file.py:Class of a controller or
             a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.
     """

@@ -46,10 +46,10 @@ class PPOConfig:
         gamma: Discount γ of a reward that comes one policy step later.
         gae_lambda: Decay λ of advantage estimation: 1 for returns alone, 0 for one step and the
             critic.
-        clip_range: Change of an action's probability, relative, beyond which it brings nothing.
+        clip_range: Relative change of an action's probability beyond which the loss is clipped.
         ent_coef: Weight of the policy's entropy in the loss.
         vf_coef: Weight of the critic's error in the loss.
-        max_grad_norm: Norm at which a gradient is cut.
+        max_grad_norm: Norm at which a gradient is clipped.
         target_kl: The update of a rollout ends where the KL divergence exceeds 1.5 times this;
             None: never.
         net_arch: Widths of the actor's hidden layers, and of the critic's unless it has its own.
@@ -125,7 +125,7 @@ class EvaluationConfig:
 
     Attributes:
         every: Environment steps from one evaluation to the next.
-        trials: Held-out pushes that each evaluation plays.
+        trials: Held-out pushes of each evaluation.
         seed: Seed of the held-out pushes, which are never used for training.
         pushes: Distribution of the held-out pushes; None: that of training.
     """
@@ -211,7 +211,7 @@ class TrainConfig:
         return self.action not in ("torque", "position", "velocity")
 
     def make_training_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
-        """As `make_env`, with the terms that the critic alone sees: `observation.privileged`."""
+        """Return `make_env` with terms that only the critic observes: `observation.privileged`."""
         return self.make_env(robot, **{"observation": self.env.observation, **overrides})
 
     def make_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:

@@ -82,7 +82,7 @@ class Policy(Copyable):
         self._make_env = carried(config.make_env)
 
     def act(self, observation: np.ndarray) -> np.ndarray:
-        """Deterministic action (..., na) for raw observations (..., no).
+        """Return the deterministic action (..., na) for raw observations (..., no).
 
         An observation gives the same bits alone as in a batch: each is a product of its own.
         """
@@ -103,8 +103,8 @@ class Policy(Copyable):
 
         Args:
             observation: (..., no), raw.
-            state: not looked at, for the policy has no memory.
-            episode_start: not looked at, either.
+            state: ignored: the policy has no memory.
+            episode_start: ignored.
             deterministic: must be true: of the Gaussian only the mean is kept.
 
         Returns:
@@ -114,7 +114,7 @@ class Policy(Copyable):
             ConfigError: `deterministic` is false.
         """
         if not deterministic:
-            raise ConfigError("knows the mean of its actions only, no random ones",
+            raise ConfigError("has the mean of its actions only, no random ones",
                               source="policy", field="deterministic")  # fmt: skip
         return self.act(observation).astype(np.float32), None
 

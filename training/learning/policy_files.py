@@ -54,7 +54,7 @@ def find_checkpoint(folder: Path) -> Path | None:
 
 
 def beside(folder: Path, suffix: str) -> Path:
-    """Where a folder is built, or kept, while it is replaced."""
+    """Return the place where a folder is built, or kept, while it is replaced."""
     folder = Path(os.path.abspath(folder))  # "." has no name
     return folder.parent / f".{folder.name}.{suffix}"
 
@@ -81,7 +81,7 @@ def check_controller(state: dict[str, object], config: TrainConfig, path: Path) 
 
 
 def controller_fingerprint(config: TrainConfig) -> str:
-    """Hash of the configuration of the controller below the policy; empty if there is none.
+    """Return a hash of the configuration of the controller below the policy; empty without one.
 
     Which other one takes its place where state and robot are uncertain does not count: the gains
     that are learned on stay as they are.
@@ -112,7 +112,7 @@ def last_state(run: Path) -> dict[str, Any]:
 
 
 def read_statistics(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Arrays of vecnormalize.npz by name, such as ``obs_mean`` (no,) and ``clip_obs`` ().
+    """Return arrays of vecnormalize.npz by name, such as ``obs_mean`` (no,), ``clip_obs`` ().
 
     Raises ConfigError for one that is missing, of another type than floats, not finite, or beyond
     what statistics may be (`RANGES`).

@@ -134,7 +134,7 @@ def first_policy(name: str | None) -> Path | PolicyFileConfig | None:
 
 
 def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
-    """PPO whose first policy is the controller alone: the mean's last layer is zero."""
+    """Return a PPO whose first policy is the controller alone: the mean's last layer is zero."""
     ppo = config.ppo
 
     def learning_rate(remaining: float) -> float:
@@ -171,7 +171,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 
 
 def _seen(env: VecNormalize) -> int:
-    """Entries of the observation that the actor sees."""
+    """Return the number of observation entries that the actor sees."""
     return int(env.get_attr("seen", indices=0)[0])
 
 
@@ -230,7 +230,7 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
 
 
 def check_pushes(config: TrainConfig, env: BalanceEnv) -> None:
-    """Raises ConfigError, naming the field, for pushes that do not fit the environment's robot."""
+    """Raise ConfigError, naming the field, for pushes that do not fit the environment's robot."""
     margin = env.simulation.state.support_margin
     for section in ("env", "evaluation"):
         sampler = getattr(config, section).pushes

@@ -1,4 +1,4 @@
-"""Whether an exported file does what the policy does."""
+"""Comparison of an exported file with the policy."""
 
 from pathlib import Path
 from typing import Final

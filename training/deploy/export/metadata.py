@@ -144,7 +144,7 @@ def scale_of(term: Term, scales: Scales) -> str:
 
 
 def _list(values: Iterable[object]) -> str:
-    """Values with commas between them; numbers with all their digits."""
+    """Return values with commas between them; numbers with all their digits."""
     return ",".join(
         repr(float(value)) if isinstance(value, (float, np.floating)) else str(value)
         for value in values

@@ -39,9 +39,9 @@ class PolicyCheck:
         known: the public policy that the network is, by its sum, or None.
         sizes: of the network.
         layouts: usual observations of its size, where nothing describes it.
-        unsaid: fields of `WORDS` that nothing says.
+        unsaid: fields of `WORDS` that are not specified.
         stood: how it stood; None where nothing describes it.
-        findings: what a rollout tells.
+        findings: results of the comparison with a rollout.
         tried: readings of what the description leaves open, where it fell or was never at rest.
         proposed: the one of them that stood best, better than what is described; or None.
         held: whether it tracks a motion whose first frame is held.
@@ -128,14 +128,14 @@ def _better(tried: list[Tried], stood: Stood) -> Tried | None:
 
 
 def _said(path: Path) -> dict[str, object]:
-    """What the metadata of an ONNX file say."""
+    """Return what the metadata of an ONNX file state."""
     if is_script(path):
         return {}
     return metadata_fields(onnx_session(path).get_modelmeta().custom_metadata_map, path)
 
 
 def _layouts(sizes: Sizes, joints: int) -> list[Layout]:
-    """Usual layouts of the largest input, the likeliest three."""
+    """Return the three likeliest layouts of the largest input."""
     given = [size for size in sizes.inputs.values() if size]
     actions = next((size for size in sizes.outputs.values() if size), None)
     if not given or actions is None:

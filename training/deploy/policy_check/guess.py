@@ -1,4 +1,4 @@
-"""What a network's sizes tell of its observation, where nothing describes it."""
+"""Guess a network's observation from its sizes, where nothing describes it."""
 
 import math
 from collections.abc import Iterator

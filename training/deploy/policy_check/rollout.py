@@ -1,4 +1,4 @@
-"""A rollout that a policy's maker recorded, and what it tells of a description."""
+"""A rollout recorded by a policy's authors, compared with its description."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,7 @@ COMMANDED = (*COMMANDS, *CLOCKS, *MOTION_TERMS)
 
 @dataclass(frozen=True)
 class Rollout:
-    """Steps of a policy as its maker saw them: T of them.
+    """T steps of a policy, recorded by its authors.
 
     Attributes:
         observations: (T, n) values of each input of the network; "" stands for the only one.
@@ -77,7 +77,7 @@ def read_rollout(
 
 
 def compare(policy: PolicyFile, source: Path) -> list[Finding]:
-    """What the rollout in a file tells of a policy's network and of its observation.
+    """Return the findings of a rollout file about a policy's network and its observation.
 
     Raises ConfigError as `read_rollout`, and for observations or actions of another size.
     """

@@ -1,4 +1,4 @@
-"""All that is known of a robot before a controller is tried on it."""
+"""All checks of a robot description before a controller runs on it."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -86,7 +86,7 @@ class RobotCheck:
 
     @property
     def in_place(self) -> float:
-        """Mean over the directions of the impulse that the ankles hold [N·s]."""
+        """Mean over the directions of the ankle limit [N·s]."""
         return float(np.mean([each.in_place for each in self.directions]))
 
     @property

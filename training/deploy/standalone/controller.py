@@ -102,7 +102,7 @@ class StandaloneController(OutsideController):
         self._call = 0
 
     def torques(self, readings: Readings) -> np.ndarray:
-        """Motor torques (nu,) [N·m], within the limits, to hold for one `period`.
+        """Return motor torques (nu,) [N·m], within the limits, to hold for one `period`.
 
         Raises ConfigError naming what is missing or no number; PoiseError before a `reset`.
         """

@@ -1,4 +1,4 @@
-"""A candidate of `poise tune` is judged here, by how pushes and walks around the limit end."""
+"""Scores of the candidates of `poise tune`: outcomes of pushes and walks around the limit."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # it loads torch
     from poise.training.learning.policy import Policy
 
 SLACK = 0.2  # relative error of a walk's speed at which its worth is least
-UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not quiet, or fell
+UNQUIET, FALLEN = 0.6, 0.3  # largest score of a trial that is upright but not quiet, or fell
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _as_commanded(command: TimedCommand, outcome: Outcome) -> float:
 
 
 def follow(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.ndarray:
-    """Limits (directions,) [N·s] nearer to where half of the pushes are recovered.
+    """Return limits (directions,) [N·s] nearer to where half of the pushes are recovered.
 
     `values` (candidates, directions, levels) is `worth`.
     """

@@ -1,7 +1,7 @@
 """Settings of a search and the trials of its candidates: pushes around a limit, or walks.
 
 All of a generation meet the same; every generation draws new ones. The limit of each direction, or
-the speed of each command, follows the candidates: it rises while they master more than half.
+the speed of each command, follows the candidates: it rises while they succeed in more than half.
 """
 
 from dataclasses import dataclass, field, replace
@@ -60,7 +60,7 @@ class TuningPushes:
         return trials
 
     def words(self, who: str, limits: np.ndarray) -> str:
-        """What half of the candidates master, for the terminal."""
+        """Return a line for the terminal: what half of the candidates recover from or follow."""
         return f"half recovered {who} at {limits.mean():.1f} N·s (worst {limits.min():.1f})"
 
 
@@ -101,7 +101,7 @@ class TuningWalks:
         return trials
 
     def words(self, who: str, limits: np.ndarray) -> str:
-        """What half of the candidates master, for the terminal."""
+        """Return a line for the terminal: what half of the candidates recover from or follow."""
         return (f"half walk {who} at {limits.mean():.2f} of the command "
                 f"(worst {limits.min():.2f})")  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""What a person reads of followed motions and of retargeting."""
+"""Printed tables of followed motions and of retargeting."""
 
 from collections.abc import Sequence
 

@@ -80,7 +80,7 @@ class Tracking:
             self._counted += env.motion_time < env.motion.duration + COUNTED
 
     def figures(self) -> TrackingFigures:
-        """What has been so far."""
+        """Return the figures so far."""
         period = self._env.config.policy_period
         table = np.array(self._errors).reshape(-1, 4)
         last = table[-round(LAST / period) :]

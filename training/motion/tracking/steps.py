@@ -72,7 +72,7 @@ class StepErrors:
             self._slide = max(self._slide, float(np.linalg.norm((point - rest)[:2])))
 
     def figures(self) -> StepFigures:
-        """What has been so far."""
+        """Return the figures so far."""
         controller = self._env.controller
         performance = controller.performance if isinstance(controller, MotionStep) else None
         if performance is None:

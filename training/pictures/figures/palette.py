@@ -51,13 +51,13 @@ def readable(colour: RGB, ground: RGB) -> RGB:
 
 
 def contrast(first: RGB, second: RGB) -> float:
-    """WCAG's contrast of two colours, 1 to 21."""
+    """Return WCAG's contrast of two colours, 1 to 21."""
     low, high = sorted((luminance(first), luminance(second)))
     return (high + 0.05) / (low + 0.05)
 
 
 def luminance(colour: RGB) -> float:
-    """WCAG's relative luminance, 0 to 1."""
+    """Return WCAG's relative luminance, 0 to 1."""
     return float(linear_rgb(colour) @ [0.2126, 0.7152, 0.0722])
 
 

@@ -57,7 +57,7 @@ class Series:
 
 
 def series(name: str, index: int, rows: Sequence[ArrayLike]) -> Series:
-    """From rows of (x, y, low, high) or (x, y, low, high, side), any number of them."""
+    """Return a series from any number of rows (x, y, low, high) or (x, y, low, high, side)."""
     columns = np.array(rows, dtype=float).reshape(len(rows), -1 if rows else 4).T
     return Series(name, index, *columns)
 

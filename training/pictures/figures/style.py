@@ -75,7 +75,7 @@ class Look(NamedTuple):
 
 
 def look(index: int) -> Look:
-    """Look of the series number `index`; the first is the baseline.
+    """Return the look of the series number `index`; the first is the baseline.
 
     Colours repeat after eight, with other markers; after 48 everything repeats.
     """

@@ -94,7 +94,7 @@ class Live:
         return self.session.push(**fields)
 
     def walk(self, **fields: object) -> TimedCommand:
-        """Tell those that walk a command; see `Session.walk`."""
+        """Command those that walk; see `Session.walk`."""
         return self.session.walk(**fields)
 
     def film(self, name: str, path: Path) -> None:

@@ -47,7 +47,7 @@ class Pace:
         return min(self._owed / self._period, 1.0)
 
     def until_due(self, period: float) -> float:
-        """Wall-clock seconds until the next step is due."""
+        """Return the wall-clock time [s] until the next step is due."""
         return max((period - self._owed) / self.speed, 0.0)
 
     @property
