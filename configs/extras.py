@@ -17,7 +17,7 @@ def how_to_install(extra: str) -> str:
 
 @contextmanager
 def needing(extra: str, source: str | Path | None = None) -> Iterator[None]:
-    """Import in it what an extra brings; raises ConfigError, which says how to get what is missing.
+    """Import an extra's packages in the block; raise ConfigError with the install command.
 
     `source` is what the error is of.
     """

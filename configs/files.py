@@ -97,7 +97,7 @@ def check_new_folder(out: str | Path) -> None:
 
 @contextlib.contextmanager
 def new_folder(out: str | Path) -> Iterator[Path]:
-    """A folder to fill, which is at `out` once the block has ended without an error.
+    """Yield a folder to fill, which is at `out` once the block has ended without an error.
 
     Until then, and after an error or a kill, there is nothing at `out`. Missing folders above it
     are made.
@@ -121,7 +121,7 @@ def new_folder(out: str | Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _writing(out: Path) -> Iterator[None]:
-    """Turn what a system says of a folder that cannot be written into a PoiseError."""
+    """Turn the system's error for a folder that cannot be written into a PoiseError."""
     try:
         yield
     except OSError as error:

@@ -71,7 +71,7 @@ def whole_path(
 
 @contextlib.contextmanager
 def parsing(path: str | Path, why: str = "cannot be read") -> Iterator[None]:
-    """Turn whatever a parser makes of strange bytes into one ConfigError that names the file."""
+    """Turn any parser error into one ConfigError that names the file."""
     try:
         yield
     except PoiseError:

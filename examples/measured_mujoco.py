@@ -26,7 +26,7 @@ before = data.qvel[:3].copy()
 
 
 def measure() -> Measurement:
-    """What the sensors tell after a physics step."""
+    """Return the sensor readings after a physics step."""
     axes = data.xmat[robot.root_body_id].reshape(3, 3)
     acceleration = (data.qvel[:3] - before) / model.opt.timestep - model.opt.gravity
     ground = data.qfrc_constraint[:6].copy()  # force in the world's axes, moment in the root's

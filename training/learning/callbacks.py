@@ -62,10 +62,10 @@ class RolloutLog(BaseCallback):
 
 
 class Checkpoints(BaseCallback):
-    """Writes last/ after every rollout, and best/ after the best evaluation of what was trained.
+    """Write last/ after every rollout, and best/ after the best evaluation of a trained policy.
 
     With `keep_every` of the configuration a policy is also kept in kept/STEPS, at the start and
-    whenever so many more steps are done. All are in the folder `out` of the run. `say` is called
+    every `keep_every` steps. All are in the folder `out` of the run. `say` is called
     with what an evaluation is doing, a few words.
     """
 

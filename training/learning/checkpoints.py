@@ -45,7 +45,7 @@ FEW = 1e5  # observations: a few rollouts
 def save_checkpoint(
     folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, object]
 ) -> None:
-    """Write the folder whole; raises PoiseError when the disk refuses."""
+    """Write the folder whole; raises PoiseError if it cannot be written."""
     new, old = beside(folder, "new"), beside(folder, "old")
     try:
         shutil.rmtree(new, ignore_errors=True)

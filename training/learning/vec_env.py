@@ -92,5 +92,5 @@ class ThreadedVecEnv(Copyable, VecEnv):
     def env_is_wrapped(
         self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """Environments here are bare."""
+        """Return False for each: the environments are not wrapped."""
         return [False for _ in self._get_indices(indices)]

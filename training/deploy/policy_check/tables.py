@@ -115,7 +115,7 @@ def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:
         say("no usual observation has that size")
     for layout in check.layouts:
         say(f"perhaps {layout}")
-    say("nothing says what its numbers mean; a description needs, in its maker's words:")
+    say("nothing describes its observation; a description needs, in its authors' terms:")
     for name in check.unsaid:
         say(f"  {name}: {WORDS[name]}")
     say("to begin with, in a .yaml file beside it:")
@@ -145,7 +145,7 @@ def _verdict(check: PolicyCheck) -> str:
     if check.stood is not None and check.stood.fell is not None:
         return "it does not stand: another robot, gains, order of joints, or term than its own"
     if not check.findings:
-        return ("that it stands is a sign, no proof: --rollout compares it with steps of its "
-                "maker's loop")  # fmt: skip
+        return ("standing is evidence, not proof: --rollout compares it with steps recorded by its "
+                "authors")  # fmt: skip
     right = sum(each.right is True for each in check.findings)
     return f"the adapter is right, as far as {right} of {len(check.findings)} findings show"

@@ -27,7 +27,7 @@ UNSOLVED = 0.01  # of the ticks
 
 @dataclass(frozen=True)
 class Fault:
-    """Something of a robot that will go wrong.
+    """A fault of a robot description.
 
     Attributes:
         kind: what it is, in a word or two.

@@ -109,7 +109,7 @@ Out = str | Path | Inline  # a PNG file, or a part of a page
 
 @contextmanager
 def saved_figure(out: Out, width: float, height: float) -> Iterator[Figure]:
-    """A figure to draw on, [in], saved as a PNG or put into a page when the block ends well.
+    """Yield a figure [in], saved as a PNG or put into a page when the block succeeds.
 
     A file appears complete or not at all, and the same drawing gives the same bytes.
 

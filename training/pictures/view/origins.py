@@ -55,7 +55,7 @@ class Visits:
 
 @contextlib.contextmanager
 def own_pages_only(loopback: bool, visits: Visits) -> Iterator[None]:
-    """Have servers that are started meanwhile refuse what is not of their own pages, by 403.
+    """Make servers started in the block answer 403 to requests from other pages.
 
     `visits` is called for pages that are opened; one that it refuses is answered by 404.
 

@@ -99,6 +99,6 @@ def greeting(host: str, port: int, link: str = "") -> list[str]:
 
 @contextlib.contextmanager
 def _silent() -> Iterator[None]:
-    """viser prints what `greeting` says better."""
+    """Suppress viser's own greeting; `greeting` replaces it."""
     with contextlib.redirect_stdout(io.StringIO()):
         yield
