@@ -1,4 +1,4 @@
-"""Archives that anybody may have written, unpacked within bounds: zip files, and arrays in them."""
+"""Untrusted archives, unpacked within bounds: zip files, and arrays in them."""
 
 import io
 import zipfile
@@ -57,7 +57,7 @@ class Archive:
 
 
 def read_archive(path: str | Path) -> Archive:
-    """A zip file of at most 64 MiB; raises ConfigError as `Archive`."""
+    """Return a zip file of at most 64 MiB; raises ConfigError as `Archive`."""
     return Archive(read_bytes(path, ARCHIVE_BYTES), path)
 
 
@@ -79,7 +79,7 @@ def read_arrays(path: str | Path, names: Sequence[str], kinds: str = "f") -> dic
 
 
 def read_names(path: str | Path, name: str) -> tuple[str, ...]:
-    """The texts of an array in an .npz file; () where it has none of that name.
+    """Return the texts of an array in an .npz file; () where it has none of that name.
 
     Raises ConfigError for an array of something else.
     """
@@ -94,7 +94,7 @@ def read_names(path: str | Path, name: str) -> tuple[str, ...]:
 
 
 def _array(data: bytes, name: str, kinds: str) -> np.ndarray:
-    """The array in an .npy file; raises ValueError for what is none of floats."""
+    """Return the array in an .npy file; raises ValueError for what is none of floats."""
     file = io.BytesIO(data)
     version = np.lib.format.read_magic(file)
     if version != (1, 0):  # what NumPy writes of plain arrays

@@ -43,7 +43,7 @@ def meant(name: object, names: Iterable[str]) -> str:
 
 
 def raised(error: BaseException) -> str:
-    """What an exception of somebody's own code says, in one line: its class, its text, its place.
+    """Return an exception of user code in one line: its class, its text, its place.
 
     The place, ``file.py:12``, is the last line that ran of code that is neither of Poise nor of an
     installed library; of a class that is itself installed, the line that Poise called.

@@ -8,7 +8,7 @@ from .errors import ConfigError
 
 
 def how_to_install(extra: str) -> str:
-    """The command that installs an extra such as "view", for a message or a docstring.
+    """Return the command that installs an extra such as "view", for a message or a docstring.
 
     Poise is on no index yet: it runs in the checkout that Poise is installed from.
     """
@@ -17,7 +17,7 @@ def how_to_install(extra: str) -> str:
 
 @contextmanager
 def needing(extra: str, source: str | Path | None = None) -> Iterator[None]:
-    """Import in it what an extra brings; raises ConfigError, which says how to get what is missing.
+    """Import an extra's packages in the block; raise ConfigError with the install command.
 
     `source` is what the error is of.
     """

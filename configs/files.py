@@ -12,12 +12,12 @@ from .errors import ConfigError, PoiseError, meant, shown
 from .outputs import check_out_folder
 from .reading import is_file, is_folder
 
-#: kind → suffixes that do besides those of YAML
+#: kind → suffixes that are accepted in addition to those of YAML
 OTHERS = {"robots": (".xml", ".mjcf", ".urdf")}
 
 
 def packaged(kind: str) -> list[str]:
-    """Names of the packaged configurations of one kind: ``packaged("robots")``.
+    """Return names of the packaged configurations of one kind: ``packaged("robots")``.
 
     A configuration is a file, ``NAME.yaml``, or a folder, ``NAME/config.yaml`` (policies).
     """
@@ -32,7 +32,7 @@ def packaged_folder(kind: str) -> Path:
 
 
 def resolve(kind: str, name: str | Path) -> Path:
-    """The YAML file of a packaged name (``humanoid``) or of a path to a ``.yaml`` file.
+    """Return the YAML file of a packaged name (``humanoid``) or of a path to a ``.yaml`` file.
 
     Args:
         kind: folder of ``poise.configs``, such as ``robots`` or ``controllers``.
@@ -97,7 +97,7 @@ def check_new_folder(out: str | Path) -> None:
 
 @contextlib.contextmanager
 def new_folder(out: str | Path) -> Iterator[Path]:
-    """A folder to fill, which is at `out` once the block has ended without an error.
+    """Yield a folder to fill, which is at `out` once the block has ended without an error.
 
     Until then, and after an error or a kill, there is nothing at `out`. Missing folders above it
     are made.
@@ -121,7 +121,7 @@ def new_folder(out: str | Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _writing(out: Path) -> Iterator[None]:
-    """Turn what a system says of a folder that cannot be written into a PoiseError."""
+    """Turn the system's error for a folder that cannot be written into a PoiseError."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Configurations that are told apart by their `kind`, each kind in a file of its own."""
+"""Configurations distinguished by their `kind`, each kind in a file of its own."""
 
 import importlib
 import pkgutil

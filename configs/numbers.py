@@ -43,7 +43,7 @@ def whole_number(value: Any, least: int, field: str, source: str | None = None) 
 def whole_steps(
     time: float, step: float, field: str, source: str | None = None, least: int = 1
 ) -> int:
-    """The number of steps of `step` in `time`, both in [s].
+    """Return the number of steps of `step` in `time`, both in [s].
 
     Raises ConfigError unless it is whole and at least `least`.
     """

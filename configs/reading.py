@@ -1,4 +1,4 @@
-"""Files that anybody may have written, read within bounds.
+"""Untrusted files, read within bounds.
 
 What comes back are plain values; everything else is a ConfigError of one line, naming the file:
 a file that is missing, too large, no file at all, or not what it should be.
@@ -55,7 +55,7 @@ def exists(path: str | Path) -> bool:
 def whole_path(
     path: str | Path, source: str | Path | None = None, field: str | None = None
 ) -> Path:
-    """The absolute path, links followed, whether or not there is such a file.
+    """Return the absolute path, links followed, whether or not there is such a file.
 
     Raises ConfigError, about `field` of `source`, for a name that no file can have and for links
     that lead in a circle (from Python 3.13 on such a path is that of no file).
@@ -71,7 +71,7 @@ def whole_path(
 
 @contextlib.contextmanager
 def parsing(path: str | Path, why: str = "cannot be read") -> Iterator[None]:
-    """Turn whatever a parser makes of strange bytes into one ConfigError that names the file."""
+    """Turn any parser error into one ConfigError that names the file."""
     try:
         yield
     except PoiseError:
@@ -81,7 +81,7 @@ def parsing(path: str | Path, why: str = "cannot be read") -> Iterator[None]:
 
 
 def read_bytes(path: str | Path, limit: int) -> bytes:
-    """The content of a regular file of at most `limit` bytes; a pipe or a device is none.
+    """Return the content of a regular file of at most `limit` bytes; a pipe or a device is none.
 
     Raises:
         ConfigError: no such file, no permission, no file, a larger one, a pointer of Git LFS.
@@ -118,7 +118,7 @@ def read_text(path: str | Path, limit: int) -> str:
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:
-    """The mapping in a YAML file.
+    """Return the mapping in a YAML file.
 
     Raises:
         ConfigError: the file is missing or larger than 1 MiB, does not parse, is nested too deep,
@@ -140,7 +140,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 
 
 def read_json(path: str | Path) -> dict[str, Any]:
-    """The mapping in a JSON file.
+    """Return the mapping in a JSON file.
 
     Raises:
         ConfigError: the file is missing or larger than 16 MiB, does not parse, is nested too deep,
@@ -157,7 +157,7 @@ def read_json(path: str | Path) -> dict[str, Any]:
 
 
 def parse_json(text: str | bytes) -> Any:
-    """A JSON value of at most 64 levels whose whole numbers have at most 308 digits.
+    """Return a JSON value of at most 64 levels whose whole numbers have at most 308 digits.
 
     Raises ValueError for everything else.
     """
@@ -180,7 +180,7 @@ def _whole(digits: str) -> int:
 
 
 def _children(value: Any) -> list[Any]:
-    """The lists and mappings in a list or a mapping."""
+    """Return the lists and mappings in a list or a mapping."""
     entries = value.values() if isinstance(value, dict) else value
     if not isinstance(value, (list, dict)):
         return []
@@ -188,12 +188,12 @@ def _children(value: Any) -> list[Any]:
 
 
 def read_lines(path: str | Path) -> Iterator[bytes]:
-    """The lines of a file of at most 128 MiB; raises ConfigError as `read_bytes`."""
+    """Return the lines of a file of at most 128 MiB; raises ConfigError as `read_bytes`."""
     return iter(io.BytesIO(read_bytes(path, TABLE_BYTES)))
 
 
 def read_table(path: str | Path, advice: str = "") -> tuple[tuple[str, ...], list[dict[str, str]]]:
-    """The columns of a CSV file, and its lines by column.
+    """Return the columns of a CSV file, and its lines by column.
 
     Raises:
         ConfigError: the file is missing or larger than 128 MiB, is no table, or has a line of

@@ -72,7 +72,7 @@ def overlay(base: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
 
 
 def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
-    """A dataclass instance from a mapping, strictly.
+    """Return a dataclass instance from a mapping, strictly.
 
     Fields may be bool, int, float, str, Path, Literal, Optional and other unions, tuple, list,
     dict with string keys, Any, and dataclasses of these. An int is taken for a float; nothing else
@@ -94,7 +94,7 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
 
 
 def checked(hint: type[T], data: Any, source: str | Path) -> T:
-    """Plain values as a type hint describes them, checked as :func:`build` does.
+    """Return plain values as a type hint describes them, checked as :func:`build` does.
 
     The hint may also hold TypedDicts. Their unknown keys are kept as they are: whoever wrote the
     file may know more.
@@ -106,7 +106,7 @@ def checked(hint: type[T], data: Any, source: str | Path) -> T:
 
 
 def to_dict(obj: Any, levels: int = DEPTH) -> Any:
-    """A dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`.
+    """Return a dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`.
 
     A field with ``metadata={"omit": "default"}`` is left out where it is its default: what was
     written before there was such a field, and hashes of it, stay as they are.
@@ -140,7 +140,7 @@ def _is_omitted(field: dataclasses.Field[Any], obj: object) -> bool:
 
 
 def to_yaml(obj: Any) -> str:
-    """YAML text of :func:`to_dict`, fields in their own order; :func:`read_yaml` reads it back."""
+    """Return the YAML text of :func:`to_dict`, fields in order; :func:`read_yaml` reads it."""
     return yaml.safe_dump(to_dict(obj), sort_keys=False, allow_unicode=True, width=100)
 
 
@@ -235,7 +235,7 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
 
 
 def _of_kind(cls: Any, data: Any, source: str, path: str) -> Any:
-    """The class that the `kind` of the data names, where `cls` is the base of several."""
+    """Return the class that the `kind` of the data names, where `cls` is the base of several."""
     if not issubclass(cls, OfKind) or kind_of(cls) or not isinstance(data, dict):
         return cls
     kinds, field = cls.kinds(), f"{path}.kind" if path else "kind"

@@ -1,6 +1,6 @@
-"""Texts that anybody may have written, as they are in pages, Markdown and terminals.
+"""Untrusted texts, shown verbatim in pages, Markdown and terminals.
 
-A name comes from a file, a folder or a result of somebody else. Where it goes into Markdown it is
+A name may come from an untrusted file, folder or result. Where it goes into Markdown it is
 `plain` or `code`; Rich's tables take it escaped (`rich.markup.escape`), templates of pages escape
 by themselves, and a `Terminal` prints what cannot be printed as an escape.
 """
@@ -22,13 +22,13 @@ def plain(text: object) -> str:
 
 
 def code(text: object) -> str:
-    """The same as code; without, where code would end within the text, or a table's cell."""
+    """Return the same as code; without, where code would end within the text, or a table's cell."""
     line = one_line(str(text))
     return plain(line) if not line or set(line) & set("`|") else f"`{line}`"
 
 
 def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown, of cells that are `plain`, `code` or our own."""
+    """Return a table in Markdown, of cells that are `plain`, `code` or our own."""
     cells = ([cell.replace("|", "\\|") for cell in line] for line in (head, *rows))
     first, *others = (f"| {' | '.join(line)} |\n" for line in cells)
     return "".join([first, "|" + "---|" * len(head) + "\n", *others])

@@ -33,7 +33,7 @@ class Loader(_Safe):
         super().__init__(stream)
 
     def get_single_node(self) -> yaml.Node | None:
-        """The root of the only document, in which no mapping repeats a key."""
+        """Return the root of the only document, in which no mapping repeats a key."""
         root = super().get_single_node()
         for node in _mappings(root):
             seen = set()
@@ -66,7 +66,7 @@ class Loader(_Safe):
 
     @staticmethod
     def _to_merge(node: yaml.MappingNode, value: yaml.Node) -> list[yaml.MappingNode]:
-        """The mappings that a ``<<`` names, the one that counts most last."""
+        """Return the mappings that a ``<<`` names, the one that counts most last."""
         found: list[Any] = value.value[::-1] if isinstance(value, yaml.SequenceNode) else [value]
         for each in found:
             if not isinstance(each, yaml.MappingNode):
@@ -163,7 +163,7 @@ def _events(stream: str | bytes) -> Iterator[yaml.Event]:
 
 
 def _mappings(root: yaml.Node | None) -> Iterator[yaml.MappingNode]:
-    """All mappings from a node on, each once."""
+    """Yield all mappings from a node on, each once."""
     waiting: list[Any] = [root]
     seen = set()
     while waiting:

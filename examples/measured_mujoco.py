@@ -26,7 +26,7 @@ before = data.qvel[:3].copy()
 
 
 def measure() -> Measurement:
-    """What the sensors tell after a physics step."""
+    """Return the sensor readings after a physics step."""
     axes = data.xmat[robot.root_body_id].reshape(3, 3)
     acceleration = (data.qvel[:3] - before) / model.opt.timestep - model.opt.gravity
     ground = data.qfrc_constraint[:6].copy()  # force in the world's axes, moment in the root's
@@ -43,7 +43,7 @@ def measure() -> Measurement:
 
 
 def step(command: tuple[np.ndarray, ...]) -> Measurement:
-    """A physics step of motors that run the servo on their own encoders."""
+    """Return a physics step of motors that run the servo on their own encoders."""
     torque, target, stiffness, damping = command
     q, dq = data.qpos[dofs + 1], data.qvel[dofs]
     data.ctrl[:] = torque + stiffness * (target - q) - damping * dq

@@ -19,7 +19,7 @@ quick = train_config("quick")
 
 
 def config(trial: optuna.Trial) -> TrainConfig:
-    """The settings of a trial."""
+    """Return the settings of a trial."""
     ppo = replace(
         quick.ppo,
         n_envs=min(quick.ppo.n_envs, max(steps // 96, 1)),
@@ -32,7 +32,7 @@ def config(trial: optuna.Trial) -> TrainConfig:
 
 
 def recovered(trial: optuna.Trial) -> float:
-    """The rate of held-out pushes that the best policy of a run recovers."""
+    """Return the rate of held-out pushes that the best policy of a run recovers."""
     run = Path(f"runs/optuna/{trial.number}")
     train(config(trial), run, progress=False)
     with (run / "evaluations.csv").open(newline="") as file:

@@ -32,7 +32,7 @@ class StifferAnkles:
 
 
 def drive_simulation(robot: Robot, seconds: float = 3.0) -> bool:
-    """The bare loop: a simulation, a controller, targets. No environment."""
+    """Return the bare loop: a simulation, a controller, targets. No environment."""
     simulation, controller = Simulation(robot), StifferAnkles(robot)
     state = simulation.state
     simulation.set_pushes(parse_pushes(PUSH, robot, state.support_margin))
@@ -45,7 +45,7 @@ def drive_simulation(robot: Robot, seconds: float = 3.0) -> bool:
 
 
 def drive_torque_balance(robot: Robot) -> bool:
-    """The environment with torques as actions: the controller reads the state beside it."""
+    """Return the environment with torques as actions: the controller reads the state beside it."""
     controller = StifferAnkles(robot)
     env = gymnasium.make(
         "poise/TorqueBalance-v0", robot=robot, policy_period=controller.period, duration=3.0

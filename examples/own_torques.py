@@ -67,7 +67,7 @@ def constrained(A: np.ndarray, b: np.ndarray, C: np.ndarray, d: np.ndarray) -> n
 
 
 def stands(robot: Robot, impulse: float = 5.0, seconds: float = 3.0) -> bool:
-    """Whether a robot that is pushed forward stands afterwards."""
+    """Return whether a robot that is pushed forward stands afterwards."""
     simulation, controller = Simulation(robot), InverseDynamics(robot)
     state = simulation.state
     push = {"impulse": impulse, "direction": 0.0, "duration": 0.1, "start": 0.5, "body": "torso"}

@@ -20,7 +20,7 @@ torso = model.body("torso").id
 
 
 def read() -> Readings:
-    """What the encoders, the inertial unit and the state estimate of a robot would tell."""
+    """Return readings of the encoders, the inertial unit and the state estimate of a robot."""
     return Readings(
         position=data.qpos[:3],
         orientation=data.qpos[3:7],

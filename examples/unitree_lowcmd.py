@@ -75,7 +75,7 @@ def ground(state: LowState) -> tuple[np.ndarray, list[bool]]:
 
 
 def measured(state: LowState) -> Measurement:
-    """What the controller measures."""
+    """Return the controller's measurements."""
     wrench, touching = ground(state)
     return Measurement(state.quaternion, state.gyroscope, state.accelerometer, state.q, state.dq,
                        wrench, touching)  # fmt: skip

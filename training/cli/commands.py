@@ -38,13 +38,12 @@ def demo(
 ) -> None:
     """Push four controllers and compare: a table, two plots and a video, in a minute or so.
 
-    momentum-qp, whose feet stay in place; capture-step, which steps; feedback-step, which steps
-    better; the policy residual-torque on top of that. The same command goes on where it was
-    stopped.
+    momentum-qp keeps its feet fixed; capture-step steps; feedback-step steps better; the policy
+    residual-torque runs on top of feedback-step. Run the same command again to resume.
 
     Args:
         out: folder to write to; out/demo, or out/demo-full, if not given.
-        full: more pushes, random ones too, and a policy with feet in place: some minutes.
+        full: more pushes, random ones too, and a policy with feet fixed: some minutes.
         workers: number of processes; all cores if not given.
         seed: of the pushes.
     """
@@ -83,18 +82,18 @@ def evaluate(
     json: Json = False,
     allow: Allow = (),
 ) -> int:
-    """Play a suite of pushes with several controllers, all on the same trials.
+    """Run several controllers on the same suite of pushes.
 
-    Writes settings.yaml, trials.jsonl, trials.csv, summary.json and plots. The same command goes on
-    where it was stopped. The result is the same for any number of workers. Exit code 1 if a
-    controller raised.
+    Writes settings.yaml, trials.jsonl, trials.csv, summary.json and plots. Run the same
+    command again to resume. The result does not depend on the number of workers. Exit code 1 if
+    a controller raised an error.
 
     Args:
         controllers: a name of `poise list`, such as residual-torque (a shipped policy), zero (no
             torque), a .yaml file of a controller, a folder written by poise train, with --seeds
-            too, or a class of your own, my_file.py:Class or module:Class. What a file or a folder
-            names so needs --allow my_file.py:Class besides.
-        suite: strong (random pushes that tell good controllers apart), random, envelope, grid,
+            too, or a class of your own, my_file.py:Class or module:Class. A class that a file or a
+            folder names also needs --allow my_file.py:Class.
+        suite: strong (random pushes that separate good controllers), random, envelope, grid,
             quiet, repeated, in-step, follow, those of poise benchmark, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
         seed: of the trials.
@@ -102,15 +101,15 @@ def evaluate(
         trials: number of pushes (random), of starts (quiet), of trials per direction and controller
             in the second stage (envelope), of repeats (grid), of sequences (repeated, in-step); of
             a suite of several parts, at most as many in every cell.
-        limits: a .yaml file that pushes are measured by; if not given, the packaged file of the
+        limits: a .yaml file of limits that scale the pushes; if not given, the packaged file of the
             robot, else its ankle limit.
         write_limits: write the first controller's J50s to this file, for --limits.
         motions: what is performed in the suite follow: packaged clips or motions, .bvh, .npz or
             .yaml files; its own if not given.
-        realism: how real the robot is: ideal (its state is known exactly and at once), lab, field,
-            or a .yaml file of a level; that of the suite if not given.
-        get_up: a robot that falls has 10 s to get up again: up again, and in what time, are
-            figures of their own.
+        realism: realism level: ideal (an exact, undelayed state), lab, field, or a .yaml file; that
+            of the suite if not given.
+        get_up: give a robot that falls 10 s to get up again; the rate and the time are reported
+            separately.
         physics: the engine that steps the robot: mujoco, drake (needs poise[drake]), or a .yaml
             file of its settings; that of the suite if not given.
     """
@@ -155,28 +154,28 @@ def benchmark(
     json: Json = False,
     allow: Allow = (),
 ) -> int:
-    """Rank controllers: J50 per direction, factors one at a time, a random mix; see docs.
+    """Rank controllers: J50 per direction, factors one at a time, a random suite; see docs.
 
-    Writes settings.yaml, trials.jsonl, trials.csv, summary.json and report.html. The same command
-    goes on where it was stopped; with other controllers it adds them. Exit code 1 if a controller
-    raised.
+    Writes settings.yaml, trials.jsonl, trials.csv, summary.json and report.html. Run the same
+    command again to resume, or with other controllers to add them. Exit code 1 if a controller
+    raised an error.
 
     Args:
         controllers: names as poise evaluate takes them, also my_file.py:Class (one that a file or
-            a folder names needs --allow my_file.py:Class besides); all packaged ones that can rest
+            a folder names also needs --allow my_file.py:Class); all packaged ones that can rest
             if not given.
-        out: folder to write to; needed, but with --submit.
+        out: folder to write to; required, except with --submit.
         suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
             .yaml file.
         seed: of the cases.
         workers: number of processes; all cores if not given.
         trials: at most as many in every cell of the suite, to try things out; of a suite of one
             part, its number.
-        realism: ideal, lab, field or a .yaml file of a level; that of the suite if not given.
+        realism: realism level: ideal, lab, field or a .yaml file; that of the suite if not given.
         physics: mujoco, drake or a .yaml file of its settings; that of the suite if not given.
         report: write report.html at the end, as poise report does.
-        submit: play nothing, but check this finished folder and pack it, without any code, into a
-            .zip beside it: the issue form for results takes that.
+        submit: run nothing; check this finished folder and pack it, without any code, into a .zip
+            beside it, which you attach to the issue form for results.
     """
     if submit is not None:
         from poise.training.benchmarking.results.submission import pack_submission
@@ -212,7 +211,7 @@ def benchmark(
 
 
 def _raised(summary: "Summary", out: Path) -> int:
-    """The exit code: 1, with a line that tells the first error, if a controller raised."""
+    """Return the exit code: 1, with a line that tells the first error, if a controller raised."""
     if failed := sum(entry["errors"] for entry in summary["controllers"].values()):
         table = out / "trials.csv"
         with table.open(newline="", encoding="utf-8") as file:
@@ -241,14 +240,14 @@ def tune(
     Args:
         out: folder to write gains.yaml (a controller) and history.jsonl to.
         config: a packaged tuning configuration or a .yaml file: which gains, how far.
-        controller: where the search starts: a packaged controller or a .yaml file.
+        controller: initial controller of the search: a packaged one or a .yaml file.
         robot: a packaged robot or a .yaml description.
         policy: a policy on top of the controller, which counts too.
         generations: of the search.
-        minutes: that the search may take; --resume goes on from where it ended.
+        minutes: time limit of the search; --resume continues it.
         seed: of the search and its pushes.
         workers: number of processes.
-        resume: go on with the search that the folder holds.
+        resume: continue the search in the folder.
     """
     from poise.baselines.allowance import named
     from poise.configs.files import resolve
@@ -303,10 +302,10 @@ def robot(
     picture: Path | None = None,
     json: Json = False,
 ) -> None:
-    """Check a robot before anything is tried on it: what it can hold, what will go wrong.
+    """Check a robot description: torque margins, ankle limit, and faults to correct.
 
     Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, two
-    seconds at rest, which controllers take it, and the pushes that a pendulum of its size stops.
+    seconds at rest, which controllers support it, and pushes that a pendulum of its size resists.
 
     Of a model alone, .xml or .urdf, it guesses the description and writes it to the current folder.
 

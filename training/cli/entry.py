@@ -1,4 +1,4 @@
-"""The process of the command `poise`: exit codes, stops, and what nobody reads any more."""
+"""The process of the command `poise`: exit codes, stops, and closed pipes."""
 
 import atexit
 import contextlib
@@ -34,15 +34,15 @@ HELP = ("-h", "--help", "--help-all")
 ALONE = ("--help", "--version", "--print-completion")  # options without a command
 USAGE = """usage: poise COMMAND [OPTIONS]
 
-Keep a simulated humanoid on its feet while it is pushed. Begin with: poise demo.
+Keep a simulated humanoid on its feet while it is pushed. Start with: poise demo.
 poise COMMAND --help tells of a command, poise --version which version this is.
 """
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a sub-command; returns 0, 1 (a fall, an error, a no), 2 after bad input or on a full
-    disk, 130 after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
+    """Run a sub-command; return 0, 1 (a fall, an error, a no), 2 after bad input or on a full
+    disk, 130 after Ctrl-C, 143 after SIGTERM, 141 if the output pipe was closed."""
     args = list(sys.argv[1:] if args is None else args)
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -101,7 +101,7 @@ def command() -> None:
 
 
 def _unread(stream: TextIO | None) -> bool:
-    """True for a pipe that nobody reads any more."""
+    """Return True for a pipe whose reader has closed it."""
     try:
         poll = select.poll()
         poll.register(stream.fileno(), 0)  # type: ignore[union-attr]

@@ -15,10 +15,10 @@ Checked = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
 def show() -> None:
-    """List the public policies that are known, where they are, and how to get the others.
+    """List the known public policies, where they are installed, and how to get the others.
 
-    Each is played by its name: poise evaluate falcon-g1 --robot unitree_g1. poise policies check
-    FILE says what is missing of another one.
+    Run each by its name: poise evaluate falcon-g1 --robot unitree_g1. For another policy,
+    poise policies check FILE reports what is missing.
     """
     from poise.baselines.policy_files.known import known_policies
     from poise.training.deploy.policy_check.tables import print_policies
@@ -29,7 +29,7 @@ def show() -> None:
 def check(
     file: Checked, /, *, robot: OnRobot, rollout: Path | None = None, allow: Allow = ()
 ) -> int:
-    """Say what a policy lacks, let it stand for 10 s, compare it with its maker's own steps.
+    """Check a policy: its description, standing for 10 s, and a rollout recorded by its authors.
 
     Args:
         file: a network (.onnx, .pt), a description (.yaml), a folder, or a known name.
@@ -37,7 +37,7 @@ def check(
             if they are known, of the states qpos and qvel of this robot.
 
     Returns:
-        0 if it is described, stands, and nothing of the rollout is against it; else 1.
+        0 if it is described, stands, and agrees with the rollout; else 1.
     """
     from poise.baselines.allowance import allowing
     from poise.envs.robots.robot import load_robot

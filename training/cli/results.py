@@ -23,7 +23,7 @@ def compare(
     *,
     json: Json = False,
 ) -> None:
-    """Say what changed from one result to another, with intervals.
+    """Print the differences between two results, with intervals.
 
     Args:
         a: written by poise benchmark or poise evaluate.
@@ -74,7 +74,7 @@ def replay(
     plot: Path | None = None,
     allow: Allow = (),
 ) -> None:
-    """Play one trial of a result again, exactly, and say whether it ends as it was recorded.
+    """Simulate one trial of a result again and check that it ends as recorded.
 
     Args:
         folder: written by poise evaluate or poise benchmark.
@@ -98,20 +98,20 @@ def replay(
             check_out_file(file, field)
     if plot is not None and len(controllers) > 1:
         raise ConfigError("of one controller alone", field="plot")
-    played = [
+    replays = [
         replay(folder, trial, name, plot=plot, allow=allow) for name in controllers or (None,)
     ]
-    for done in played:
+    for done in replays:
         _print_replay(done)
     if video is not None:
-        film(folder, trial, [done.controller for done in played], video, allow=allow)
+        film(folder, trial, [done.controller for done in replays], video, allow=allow)
     for path in (video, plot):
         if path is not None:
             print(path)
 
 
 def _print_replay(done: "Replay") -> None:
-    """How a trial ended that was played again, why, and in what it differs from its record."""
+    """Print how a trial that was simulated again ended, why, and how it differs from its record."""
     from poise.training.benchmarking.diagnosis.words import push_text, why
 
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
@@ -134,12 +134,12 @@ def report(
 ) -> None:
     """Write one HTML file that shows a result: ranking, envelopes, falls, worst trials, numbers.
 
-    The file opens from disk and needs nothing else.
+    The file is self-contained.
 
     Args:
         folder: written by poise evaluate or poise benchmark.
         out: file to write; report.html in the folder if not given.
-        films: play the worst trials again, for pictures and plots over time (seconds for each).
+        films: simulate the worst trials again, for pictures and plots over time (seconds for each).
     """
     from poise.envs.viewing.gl import choose_gl_backend
 
@@ -165,7 +165,7 @@ def gallery(
 ) -> None:
     """Write one HTML file that plays pushes of a result: choose direction, size and controller.
 
-    The file opens from disk and needs neither server nor network.
+    The file is self-contained: it needs neither server nor network.
 
     Args:
         folder: written by poise evaluate or poise benchmark.

@@ -65,14 +65,14 @@ class Command:
         config: Packaged training configuration (see poise list) or a .yaml file; the options below
             replace its fields. If not given: residual-torque, with another --robot any-robot, with
             --resume the run's own.
-        quick: Train a first policy in some ten minutes: the configuration quick.
-        realism: How real the robot is: ideal (its state is known exactly and at once), lab, field,
-            or a .yaml file of a level; that of the configuration if not given.
-        resume: Go on with the run, or the runs, that the folder holds.
+        quick: Train a first policy in about ten minutes: the configuration quick.
+        realism: Realism level: ideal (an exact, undelayed state), lab, field, or a .yaml file; that
+            of the configuration if not given.
+        resume: Continue the run, or the runs, in the folder.
         seeds: Train a run for each of these seeds, in folders seed-SEED of the folder.
-        backend: What the runs of several seeds go on: processes of this machine (local), the same
-            by joblib, or a cluster (ray).
-        workers: How many of the runs of several seeds go on at a time; all cores if not given.
+        backend: Where the runs of several seeds execute: processes of this machine (local), the
+            same by joblib, or a cluster (ray).
+        workers: Number of concurrent runs of several seeds; all cores if not given.
         allow: What may run though a file names it: module:Class or file.py:Class of a controller or
             a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.
     """
@@ -167,11 +167,11 @@ def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
 
 
 def options(config: TrainConfig) -> list[Option]:
-    """All options: the command's own, then the fields of the configuration."""
-    told, hints, own = sentences(Command), get_type_hints(Command), []
+    """Return all options: the command's own, then the fields of the configuration."""
+    helps, hints, own = sentences(Command), get_type_hints(Command), []
     for name, default in ((f.name, f.default) for f in fields(Command) if f.name != "settings"):
         kind = "" if isinstance(default, bool) else kind_of(hints[name])
-        own.append(Option(f"--{name}", kind, told[name], ""))
+        own.append(Option(f"--{name}", kind, helps[name], ""))
     return [*own, *options_of(config)]
 
 
@@ -192,7 +192,7 @@ def print_help(config: TrainConfig, everything: bool) -> None:
 
 
 def parse(args: Sequence[str]) -> Command:
-    """The command of these arguments, its configuration checked like one from a file."""
+    """Return the command of these arguments, its configuration checked like one from a file."""
     base, quick = train_config(_base(args)), _peek(args).quick
     with one_line_errors("poise train", [option.name for option in options(base)], args):
         command = tyro.cli(
@@ -210,7 +210,7 @@ def parse(args: Sequence[str]) -> Command:
 
 
 def _base(args: Sequence[str]) -> str | Path:
-    """The file that the flags' defaults come from, looked up before the flags are read."""
+    """Return the file that the flags' defaults come from, looked up before the flags are read."""
     known = _peek(args)
     if known.quick and (known.config is not None or known.resume):
         raise ConfigError("goes with no --config and no --resume: a quick run goes on with "
@@ -224,7 +224,7 @@ def _base(args: Sequence[str]) -> str | Path:
 
 
 def _peek(args: Sequence[str]) -> argparse.Namespace:
-    """The flags that matter by being there, which a parsed command does not tell."""
+    """Return the flags that matter by being there, which a parsed command does not tell."""
     peek = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--config", "--out", "--controller"):
         peek.add_argument(name)

@@ -29,7 +29,7 @@ Commands = Annotated[
     tyro.conf.UseAppendAction,
     tyro.conf.arg(
         metavar="COMMAND",
-        help="What a controller that walks is told, such as '{ahead: 0.6, left: 0, turn: 0.2, "
+        help="Command to a controller that walks, such as '{ahead: 0.6, left: 0, turn: 0.2, "
         "start: 1}' in m/s, rad/s and s; repeatable.",
     ),
 ]
@@ -56,22 +56,22 @@ def view(
 ) -> None:
     """Show the robot in the browser, in real time, to be pushed; or a trial of a result.
 
-    Up to three controllers stand side by side and meet the same pushes: of a button, or of the
-    mouse, which drags a body. With --trial it is a trial of the result in DIR, with a timeline.
+    Up to three controllers stand side by side and get the same pushes: by a button, or by dragging
+    a body with the mouse. With --trial it is a trial of the result in DIR, with a timeline.
     Needs pip install -e '.[view]' in a checkout, but for --native.
 
     Args:
         shown: controllers, feedback-step if not given; with --trial, a folder written by poise
             evaluate or poise benchmark.
         motion: that is performed: a name, a .yaml, or a .npz of poise motion import.
-        host: address to serve at; the default can be reached from this machine alone.
+        host: address to serve at; the default is reachable from this machine only.
         port: of the page; 0 is any that is free.
         seed: of the start, which is a little disturbed.
-        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
+        realism: realism level: ideal, lab, field, or a .yaml file.
         trial: a trial's number in trials.csv.
         controllers: with --trial, up to three of those that took part; the last if not given.
         native: MuJoCo's own window, of one controller; it needs a display.
-        seconds: end by itself after so long, and say how near to real time it was.
+        seconds: end after this time and print the real-time factor.
         dark: a dark page.
     """
     from poise.envs.viewing.gl import choose_gl_backend

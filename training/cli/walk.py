@@ -35,7 +35,7 @@ def walk(
     video: Path | None = None,
     allow: Allow = (),
 ) -> int:
-    """Walk at a commanded speed, pushed or not, and say how well: speed, steps, cost, falls.
+    """Walk at a commanded speed, pushed or not, and print speed, steps, cost and falls.
 
     Args:
         speed: ahead [m/s]; below 0 it walks backward.
@@ -52,7 +52,7 @@ def walk(
         seed: of the start, which is a little disturbed.
         controller: one that walks: a name, a .yaml file, or a folder written by poise train.
         terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs, rise: 0.15}".
-        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
+        realism: realism level: ideal, lab, field, or a .yaml file.
         physics: the engine that steps the robot: mujoco, drake, or a .yaml file of its settings.
         video: an MP4 or WebP file to write.
 
@@ -82,7 +82,7 @@ def walk(
 
 
 def _terrain(text: str) -> str | dict[str, object]:
-    """A kind by its name, or the mapping that the text is as YAML.
+    """Return a kind by its name, or the mapping that the text is as YAML.
 
     Raises ConfigError for text that is no YAML, or neither of these.
     """
@@ -118,11 +118,11 @@ def gait(
         compare: lip, rigid, spring, double, or controllers that walk.
         out: folder to write gaits.json and stance_knee.png to.
         speeds: ahead [m/s].
-        starts: walks at each speed, a little disturbed.
+        starts: walks at each speed, from slightly disturbed initial states.
         duration: of a walk [s].
         seed: of the starts.
         human: a packaged band of the human knee's moment or a .yaml file of one.
-        push: find J50, too; by the suite walk-push at 0.5 m/s, an hour and more.
+        push: also measure J50 with the suite walk-push at 0.5 m/s; takes over an hour.
         push_suite: another suite with a part walk_push, or a .yaml file of one.
         workers: processes of that suite; all cores if not given.
     """

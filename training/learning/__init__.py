@@ -1,1 +1,1 @@
-"""PPO: what is trained, how, and what comes of it."""
+"""PPO training: configuration, runs, checkpoints and trained policies."""

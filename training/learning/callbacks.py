@@ -62,10 +62,10 @@ class RolloutLog(BaseCallback):
 
 
 class Checkpoints(BaseCallback):
-    """Writes last/ after every rollout, and best/ after the best evaluation of what was trained.
+    """Write last/ after every rollout, and best/ after the best evaluation of a trained policy.
 
     With `keep_every` of the configuration a policy is also kept in kept/STEPS, at the start and
-    whenever so many more steps are done. All are in the folder `out` of the run. `say` is called
+    every `keep_every` steps. All are in the folder `out` of the run. `say` is called
     with what an evaluation is doing, a few words.
     """
 
@@ -137,7 +137,7 @@ class Checkpoints(BaseCallback):
             self._save(BEST)
 
     def _play(self) -> dict[str, float]:
-        """The deterministic policy on the held-out pushes, the same at every evaluation."""
+        """Return the deterministic policy on the held-out pushes, the same at every evaluation."""
         evaluation, batch = self.config.evaluation, self._batch
         assert batch is not None  # made at the start of the training
         normalize = self._normalize()
@@ -206,8 +206,8 @@ class Checkpoints(BaseCallback):
 class Progress(BaseCallback):
     """A progress bar with the recovery rate of the latest episodes and steps per second.
 
-    Its total is the end of the last rollout. It comes before `Checkpoints`, which evaluates at the
-    start, and is told so by `say`.
+    Its total is the end of the last rollout. List it before `Checkpoints`, which evaluates at the
+    start and reports that through `say`.
     """
 
     def __init__(self, config: TrainConfig):

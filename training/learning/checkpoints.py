@@ -37,7 +37,7 @@ from .policy_files import (
     read_statistics,
 )
 
-#: made anew by `PPO.load`, or of the running process alone
+#: rebuilt by `PPO.load`, or valid in the running process only
 LEFT_OUT = ("ep_info_buffer", "ep_success_buffer", "lr_schedule")
 FEW = 1e5  # observations: a few rollouts
 
@@ -45,7 +45,7 @@ FEW = 1e5  # observations: a few rollouts
 def save_checkpoint(
     folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, object]
 ) -> None:
-    """Write the folder whole; raises PoiseError when the disk refuses."""
+    """Write the folder whole; raises PoiseError if it cannot be written."""
     new, old = beside(folder, "new"), beside(folder, "old")
     try:
         shutil.rmtree(new, ignore_errors=True)
@@ -67,7 +67,7 @@ def save_checkpoint(
 
 
 def plain(model: PPO) -> PPO:
-    """The model with nothing in it that is defined by Poise, so that SB3 alone can load it.
+    """Return the model with nothing in it that is defined by Poise, so that SB3 alone can load it.
 
     It shares the weights. Its learning rate is the one at the start. Of a symmetric policy it is
     the ordinary one, f, whose weights these are: see `symmetry.py` for what is made of it.
@@ -89,8 +89,8 @@ def restore(
     """Load weights, optimizer and statistics into `model` and `normalize`; returns the state.
 
     With `newest` the network of `model` may be larger than the stored one, whose observation is the
-    part before that entry; the optimizer then begins anew. Raises ConfigError naming the file that
-    cannot be read or is for another robot than the one with this `fingerprint`.
+    part before that entry; the optimizer then starts afresh. Raises ConfigError naming the file
+    that cannot be read or is for another robot than the one with this `fingerprint`.
     """
     state = read_state(folder / STATE)
     check_robot(state, fingerprint, folder / STATE)
@@ -138,7 +138,7 @@ def _spread(found: dict[str, np.ndarray], size: int, newest: int) -> None:
 
 
 def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
-    """The statistics that normalise observations and returns, as arrays."""
+    """Return the statistics that normalise observations and returns, as arrays."""
     arrays = {
         f"{prefix}_{name}": np.asarray(getattr(moments, name), dtype=float)
         for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms))
@@ -152,7 +152,7 @@ def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
 def widened(
     small: Mapping[str, Tensor], large: Mapping[str, Tensor], end: int | None = None
 ) -> dict[str, Tensor]:
-    """Weights of the network `large` with which it computes what `small` does.
+    """Return weights of the network `large` with which it computes what `small` does.
 
     Weights W (out, in) and biases (out,) of both, of as many layers. The units that are new keep
     what comes in as initialised in `large`; nothing goes out of them yet: their columns are zero.

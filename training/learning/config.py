@@ -41,15 +41,15 @@ class PPOConfig:
         n_epochs: Passes over a rollout in its update.
         learning_rate: Step size of Adam at the start.
         final_learning_rate: Step size of Adam at the end of the run; it falls linearly in between.
-        actor_rate: Learning rate of the actor over that of the critic: small for an actor that does
-            not begin anew.
+        actor_rate: Learning rate of the actor over that of the critic: small for an actor that is
+            already trained.
         gamma: Discount γ of a reward that comes one policy step later.
         gae_lambda: Decay λ of advantage estimation: 1 for returns alone, 0 for one step and the
             critic.
-        clip_range: Change of an action's probability, relative, beyond which it brings nothing.
+        clip_range: Relative change of an action's probability beyond which the loss is clipped.
         ent_coef: Weight of the policy's entropy in the loss.
         vf_coef: Weight of the critic's error in the loss.
-        max_grad_norm: Norm at which a gradient is cut.
+        max_grad_norm: Norm at which a gradient is clipped.
         target_kl: The update of a rollout ends where the KL divergence exceeds 1.5 times this;
             None: never.
         net_arch: Widths of the actor's hidden layers, and of the critic's unless it has its own.
@@ -59,7 +59,7 @@ class PPOConfig:
         log_std_final: The same at the end of the run, linear in time in between; None: it is
             learned.
         use_sde: Explore by noise that is smooth in the state, as SB3's gSDE.
-        sde_sample_freq: Policy steps after which that noise is drawn anew; -1: once a rollout.
+        sde_sample_freq: Policy steps after which that noise is resampled; -1: once per rollout.
         symmetric: Make the policy its own mirror image, see `symmetry.py`: each push teaches two.
     """
 
@@ -104,11 +104,11 @@ class Curriculum:
 
     Attributes:
         start: Largest push at the start of the run, over its final size.
-        realism: Level of realism at the start of the run, over its final one: see
+        realism: Realism level at the start of the run, as a fraction of the final one: see
             `Realism.scaled`.
         mixed: Train environment k of n under (k + ½)/n of the level, and not all under the whole.
-        levels: Levels of realism that the environments have in turn, one each, instead of
-            `env.realism`, which evaluations keep.
+        levels: Realism levels assigned to the environments in turn, in place of `env.realism`;
+            evaluations keep `env.realism`.
         share: Fraction of the run over which both grow.
     """
 
@@ -125,7 +125,7 @@ class EvaluationConfig:
 
     Attributes:
         every: Environment steps from one evaluation to the next.
-        trials: Held-out pushes that each evaluation plays.
+        trials: Held-out pushes of each evaluation.
         seed: Seed of the held-out pushes, which are never used for training.
         pushes: Distribution of the held-out pushes; None: that of training.
     """
@@ -171,11 +171,11 @@ class TrainConfig:
         servos: The servos of `action` position, velocity or whole.
         hand_over: When the servos take over, with `action` whole.
         physics_step: Physics step of the training episodes [s]; None: the robot's own, in which
-            policies are evaluated and played.
+            policies are evaluated.
         smoothing: Time constant τ of the low-pass that an action goes through [s].
         gate: Distance of the capture point from its reference below which the action fades out [m].
         ppo: Stable-Baselines3's PPO.
-        curriculum: How pushes and the level of realism grow over the run.
+        curriculum: How pushes and the realism level grow over the run.
         evaluation: Held-out pushes during the run.
     """
 
@@ -211,11 +211,11 @@ class TrainConfig:
         return self.action not in ("torque", "position", "velocity")
 
     def make_training_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
-        """As `make_env`, with the terms that the critic alone sees: `observation.privileged`."""
+        """Return `make_env` with terms that only the critic observes: `observation.privileged`."""
         return self.make_env(robot, **{"observation": self.env.observation, **overrides})
 
     def make_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
-        """The environment of this run; `overrides` replace its arguments or fields of `env`.
+        """Return the environment of this run; `overrides` replace its arguments or fields of `env`.
 
         A loaded `robot` spares loading it again. What the critic alone sees is left out. Raises
         ConfigError for a controller from outside that the user has not allowed, see `allowing`.
@@ -264,7 +264,7 @@ class TrainConfig:
 
 
 def train_config(name_or_path: str | Path) -> TrainConfig:
-    """A packaged training configuration (`configs/training`) or a path to one.
+    """Return a packaged training configuration (`configs/training`) or a path to one.
 
     `base` in it names another one, whose fields hold where it has none of its own. Raises
     ConfigError naming the file, the field and the choices.

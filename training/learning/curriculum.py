@@ -13,7 +13,7 @@ from .config import TrainConfig
 
 
 def curriculum_levels(config: TrainConfig) -> list[Realism]:
-    """The levels of `curriculum.levels`; raises ConfigError for one that there is not."""
+    """Return the levels of `curriculum.levels`; raises ConfigError for one that there is not."""
     try:
         return [load_realism(name) for name in config.curriculum.levels]
     except ConfigError as error:
@@ -59,7 +59,7 @@ class ScheduleCallback(BaseCallback):
                 self.model.policy.log_std.fill_(log_std)
 
     def _levels(self, factor: float) -> list[Realism]:
-        """The level of each environment, `factor` of the way from `ideal`."""
+        """Return the level of each environment, `factor` of the way from `ideal`."""
         curriculum, n = self.config.curriculum, self.training_env.num_envs
         spread = [(i + 0.5) / n if curriculum.mixed else 1.0 for i in range(n)]
         levels = self.levels or [self.config.env.realism]

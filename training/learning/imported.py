@@ -88,7 +88,7 @@ class Translation:
         }
 
     def observation(self) -> Affine:
-        """The policy's observation as a function of the environment's.
+        """Return the policy's observation as a function of the environment's.
 
         Raises ConfigError for a term that the environment's lacks, in an older step than its
         observation has, with limits, or in part.
@@ -133,7 +133,7 @@ class Translation:
         return Affine(index, np.full(len(index), gain), offset).scaled(described.scale)
 
     def _command(self, i: int, age: int) -> Affine:
-        """The command: that of the environment, or the policy's own where there is none."""
+        """Return the command: that of the environment, or the policy's own where there is none."""
         places = [self._shown(i, name, age) for name in COMMAND if name in self._places]
         if not places:
             return Affine(np.full(3, -1), np.ones(3), np.array(self.config.command))
@@ -141,7 +141,7 @@ class Translation:
         return Affine(np.concatenate(places), np.array(units), np.zeros(3))
 
     def _shown(self, i: int, own: str, age: int) -> np.ndarray:
-        """The places of the environment's term `own` as it was `age` policy steps ago."""
+        """Return the places of the environment's term `own` as it was `age` policy steps ago."""
         shown = f"{own}[-{age}]" if age else own
         if shown not in self._places:
             raise self._wrong(i, f"shows {own} of {age} steps ago: observation.history must be "
@@ -164,7 +164,7 @@ class Translation:
 
 
 def _ages(term: ObservationTerm) -> list[int]:
-    """The policy steps ago that a term shows, in the order in which it shows them."""
+    """Return the policy steps ago that a term shows, in the order in which it shows them."""
     ages = list(range(term.lag, term.lag + term.history))
     return ages if term.newest_first else ages[::-1]
 
@@ -218,7 +218,7 @@ def import_statistics(
 def first_layer(
     inputs: Affine, layers: Layers, moments: RunningMeanStd, epsilon: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The policy's first layer, for observations that are normalised by these `moments`."""
+    """Return the policy's first layer, for observations that are normalised by these `moments`."""
     known = inputs.index >= 0
     mean, scale = np.zeros(len(known)), np.zeros(len(known))
     mean[known] = moments.mean[inputs.index[known]]

@@ -82,7 +82,7 @@ class Policy(Copyable):
         self._make_env = carried(config.make_env)
 
     def act(self, observation: np.ndarray) -> np.ndarray:
-        """Deterministic action (..., na) for raw observations (..., no).
+        """Return the deterministic action (..., na) for raw observations (..., no).
 
         An observation gives the same bits alone as in a batch: each is a product of its own.
         """
@@ -103,8 +103,8 @@ class Policy(Copyable):
 
         Args:
             observation: (..., no), raw.
-            state: not looked at, for the policy has no memory.
-            episode_start: not looked at, either.
+            state: ignored: the policy has no memory.
+            episode_start: ignored.
             deterministic: must be true: of the Gaussian only the mean is kept.
 
         Returns:
@@ -114,7 +114,7 @@ class Policy(Copyable):
             ConfigError: `deterministic` is false.
         """
         if not deterministic:
-            raise ConfigError("knows the mean of its actions only, no random ones",
+            raise ConfigError("has the mean of its actions only, no random ones",
                               source="policy", field="deterministic")  # fmt: skip
         return self.act(observation).astype(np.float32), None
 
@@ -134,7 +134,7 @@ class Policy(Copyable):
         return [array.tobytes() for array in numbers]
 
     def make_env(self, **overrides: Any) -> BalanceEnv:
-        """The environment that the policy was trained in; `overrides` as in `EnvConfig`."""
+        """Return the environment that the policy was trained in; `overrides` as in `EnvConfig`."""
         return self._make_env(**overrides)
 
 
@@ -144,7 +144,7 @@ def load_policy(
     *,
     allow: str | Iterable[str] = (),
 ) -> Policy:
-    """A packaged policy, a policy folder, or the best checkpoint of a run folder.
+    """Return a packaged policy, a policy folder, or the best checkpoint of a run folder.
 
     None is the packaged policy ``residual-torque``. No code from the files is executed, nor any
     that they name: a policy on a controller from outside needs `allow`, the names
@@ -168,7 +168,7 @@ def make_env(
     allow: str | Iterable[str] = (),
     **overrides: Any,
 ) -> BalanceEnv:
-    """The environment of a policy, or of a training configuration.
+    """Return the environment of a policy, or of a training configuration.
 
     Args:
         name: a policy, or what `load_policy` takes; or a `TrainConfig`, a packaged name of one or
@@ -239,7 +239,7 @@ def _option(value: object) -> str:
 
 
 def locate_policy(folder: str | Path | None) -> Path:
-    """The folder that `load_policy` reads; raises ConfigError where there is none."""
+    """Return the folder that `load_policy` reads; raises ConfigError where there is none."""
     name = SHIPPED if folder is None else str(folder)
     if name in packaged("policies"):
         path = packaged_folder("policies") / name
@@ -268,7 +268,7 @@ def _read_statistics(path: Path) -> tuple[np.ndarray, np.ndarray, float, float]:
 
 
 def _read_weights(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(weight (in, out), bias) of the actor's layers."""
+    """Return (weight (in, out), bias) of the actor's layers."""
     weights = read_weights(path)
     with parsing(path):
         actor = [key.rsplit(".", 1)[0] for key in weights if key.startswith(ACTOR)]

@@ -46,7 +46,7 @@ _VALUES = 100_000  # in a member
 
 
 def find_checkpoint(folder: Path) -> Path | None:
-    """The folder, or what a kill in the middle of a replacement left of it."""
+    """Return the folder, or what a kill in the middle of a replacement left of it."""
     for candidate in (folder, beside(folder, "old")):
         if all(is_file(candidate / name) for name in FILES):
             return candidate
@@ -54,7 +54,7 @@ def find_checkpoint(folder: Path) -> Path | None:
 
 
 def beside(folder: Path, suffix: str) -> Path:
-    """Where a folder is built, or kept, while it is replaced."""
+    """Return the place where a folder is built, or kept, while it is replaced."""
     folder = Path(os.path.abspath(folder))  # "." has no name
     return folder.parent / f".{folder.name}.{suffix}"
 
@@ -81,7 +81,7 @@ def check_controller(state: dict[str, object], config: TrainConfig, path: Path) 
 
 
 def controller_fingerprint(config: TrainConfig) -> str:
-    """Hash of the configuration of the controller below the policy; empty if there is none.
+    """Return a hash of the configuration of the controller below the policy; empty without one.
 
     Which other one takes its place where state and robot are uncertain does not count: the gains
     that are learned on stay as they are.
@@ -95,7 +95,7 @@ def controller_fingerprint(config: TrainConfig) -> str:
 
 
 def read_state(path: Path) -> dict[str, Any]:
-    """The mapping in a state.json; raises ConfigError naming the file."""
+    """Return the mapping in a state.json; raises ConfigError naming the file."""
     state = read_json(path)
     steps = state.get("timesteps")
     if type(steps) is not int or not 0 <= steps <= STEPS:
@@ -112,7 +112,7 @@ def last_state(run: Path) -> dict[str, Any]:
 
 
 def read_statistics(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Arrays of vecnormalize.npz by name, such as ``obs_mean`` (no,) and ``clip_obs`` ().
+    """Return arrays of vecnormalize.npz by name, such as ``obs_mean`` (no,), ``clip_obs`` ().
 
     Raises ConfigError for one that is missing, of another type than floats, not finite, or beyond
     what statistics may be (`RANGES`).
@@ -130,7 +130,7 @@ def read_statistics(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
 
 
 def read_weights(path: Path) -> dict[str, Tensor]:
-    """The state_dict of the network in policy.zip.
+    """Return the state_dict of the network in policy.zip.
 
     Raises ConfigError for anything but finite floats of at most `WEIGHT`.
     """
@@ -138,7 +138,7 @@ def read_weights(path: Path) -> dict[str, Tensor]:
 
 
 def read_parameters(path: Path) -> dict[str, Any]:
-    """The state_dicts of the network and its optimizer in policy.zip, as SB3 names them.
+    """Return the state_dicts of the network and its optimizer in policy.zip, as SB3 names them.
 
     Raises ConfigError as `read_weights`.
     """
@@ -181,7 +181,7 @@ def _member(archive: Archive, path: Path, part: str) -> Any:
 
 
 def _tensors(value: object, path: Path) -> Iterator[Tensor]:
-    """All tensors in mappings, lists and tuples of these."""
+    """Yield all tensors in mappings, lists and tuples of these."""
     import torch
 
     waiting, seen = [value], 0

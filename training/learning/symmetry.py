@@ -27,7 +27,7 @@ class TorchMirror(torch.nn.Module):
         self.sign = torch.as_tensor(mirror.sign, dtype=torch.float32)
 
     def forward(self, values: torch.Tensor) -> torch.Tensor:
-        """The mirror image of `values`."""
+        """Return the mirror image of `values`."""
         return self.sign * values[..., self.order]
 
 
@@ -39,7 +39,7 @@ class BothSides(FlattenExtractor):
         self.mirror = TorchMirror(mirror)
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """The features of observations (n, no) and of their mirror images."""
+        """Return the features of observations (n, no) and of their mirror images."""
         features = super().forward(observations)
         return torch.stack([features, self.mirror(features)])
 
@@ -71,7 +71,7 @@ class MirroredMeanStd(RunningMeanStd):
         self.mirror = mirror
 
     def alike(self, mean: np.ndarray, var: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Means and variances (no,) of which half are of the mirror images."""
+        """Return means and variances (no,) of which half are of the mirror images."""
         other = self.mirror(mean)
         spread = 0.25 * (mean - other) ** 2
         return 0.5 * (mean + other), 0.5 * (var + var[self.mirror.order]) + spread

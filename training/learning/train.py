@@ -63,8 +63,8 @@ def train(
     `config.start_from`, if there is one, of the same robot; its network may be smaller
     (`widened`). The same configuration gives the same weights, whatever the number of threads; a
     resumed run starts new episodes, and so differs. `callback`, one of Stable-Baselines3 or
-    several, is called besides, such as Weights & Biases' `WandbCallback`; what it only reads
-    changes nothing. A controller from outside (``module:Class``)
+    several, is also called, such as Weights & Biases' `WandbCallback`; one that only reads
+    does not change the result. A controller from outside (``module:Class``)
     that the configuration names must be among `allow`.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
@@ -118,7 +118,7 @@ def train(
 
 
 def first_policy(name: str | None) -> Path | PolicyFileConfig | None:
-    """The policy that a new run begins with: a folder, one from outside, or None.
+    """Return the policy that a new run begins with: a folder, one from outside, or None.
 
     Raises ConfigError for a name of neither, and for a controller that is no policy.
     """
@@ -134,7 +134,7 @@ def first_policy(name: str | None) -> Path | PolicyFileConfig | None:
 
 
 def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
-    """PPO whose first policy is the controller alone: the mean's last layer is zero."""
+    """Return a PPO whose first policy is the controller alone: the mean's last layer is zero."""
     ppo = config.ppo
 
     def learning_rate(remaining: float) -> float:
@@ -171,7 +171,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 
 
 def _seen(env: VecNormalize) -> int:
-    """Entries of the observation that the actor sees."""
+    """Return the number of observation entries that the actor sees."""
     return int(env.get_attr("seen", indices=0)[0])
 
 
@@ -230,7 +230,7 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
 
 
 def check_pushes(config: TrainConfig, env: BalanceEnv) -> None:
-    """Raises ConfigError, naming the field, for pushes that do not fit the environment's robot."""
+    """Raise ConfigError, naming the field, for pushes that do not fit the environment's robot."""
     margin = env.simulation.state.support_margin
     for section in ("env", "evaluation"):
         sampler = getattr(config, section).pushes
@@ -251,7 +251,7 @@ def _env_seed(seed: int) -> int:
 
 
 def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
-    """The checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
+    """Return the checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
     check_out_folder(out)
     try:
         str(out).encode()

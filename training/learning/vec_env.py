@@ -74,7 +74,7 @@ class ThreadedVecEnv(Copyable, VecEnv):
         self.batch.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of each environment."""
+        """Return an attribute of each environment."""
         return [getattr(self.batch.envs[i], attr_name) for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
@@ -92,5 +92,5 @@ class ThreadedVecEnv(Copyable, VecEnv):
     def env_is_wrapped(
         self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """Environments here are bare."""
+        """Return False for each: the environments are not wrapped."""
         return [False for _ in self._get_indices(indices)]

@@ -1,1 +1,1 @@
-"""Motions and gaits played as measurements: followed, tracked, compared."""
+"""Evaluation of motions and gaits: followed, tracked, compared."""

@@ -58,7 +58,7 @@ BONES = {
 
 
 def record_clips() -> list[Clip]:
-    """All packaged clips, of the default humanoid, in the order of their names."""
+    """Return all packaged clips, of the default humanoid, in the order of their names."""
     robot = load_robot("humanoid")
     made = {path.stem: clip_of(robot, _postures(robot, path), RATE, path.stem) for path in _files()}
     return [replace(made[name], name=f"humanoid_{name}") for name in sorted(made)]
@@ -71,7 +71,7 @@ def _files() -> list[Path]:
 
 
 def _postures(robot: Robot, path: Path) -> np.ndarray:
-    """The postures (F, nq) of a file of keyframes, in which joints are roles too."""
+    """Return the postures (F, nq) of a file of keyframes, in which joints are roles too."""
     own = {name: {name: 1.0} for name in robot.joint_names}
     roles = {**robot.description.roles, **own}
     free = replace(robot, description=replace(robot.description, roles=roles))
@@ -82,7 +82,7 @@ def _postures(robot: Robot, path: Path) -> np.ndarray:
 
 
 def postures_of(motion: ReferenceMotion, robot: Robot) -> np.ndarray:
-    """The postures (F, nq) of a motion whose soles stay, `RATE` apart."""
+    """Return the postures (F, nq) of a motion whose soles stay, `RATE` apart."""
     bodies, stance = ReferenceBodies(motion, robot), Stance.of(Simulation(robot).state)
     found = []
     for time in np.arange(0.0, motion.duration + 0.5 * RATE, RATE):

@@ -1,1 +1,1 @@
-"""What is looked at: figures, the report's pages, and the viewer."""
+"""Figures, the report's pages, and the viewer."""

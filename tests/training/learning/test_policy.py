@@ -82,7 +82,7 @@ def test_predict_is_act_as_sb3_calls_it():
     actions, state = policy.predict(batch, state=None, episode_start=starts, deterministic=True)
     assert state is None and actions.shape == (2, *env.action_space.shape)
     assert np.array_equal(actions[0], action) and np.any(actions[1] != action)
-    with pytest.raises(ConfigError, match="deterministic: knows the mean of its actions only"):
+    with pytest.raises(ConfigError, match="deterministic: has the mean of its actions only"):
         policy.predict(observation, deterministic=False)
     envs = ThreadedVecEnv(replicate(env, 2))
     mean, _ = evaluate_policy(policy, envs, n_eval_episodes=2, warn=False)

@@ -29,17 +29,17 @@ def check(
     fit: Switch = False,
     out: Path | None = None,
 ) -> int:
-    """Say whether a robot can do a motion: ground, motors and joints, 100 times a second.
+    """Check whether a robot can perform a motion: ground, motors and joints, at 100 Hz.
 
     Args:
         motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
-        qp: also ask the momentum QP what it makes of the motion, at every sample.
-        controller: a momentum QP, whose gains the QP has.
-        fit: change a .npz until the robot can do it: slower, or with its centre of mass moved.
-        out: the .npz file to write what was fitted to.
+        qp: also solve the momentum QP at every sample of the motion.
+        controller: a momentum QP whose gains are used.
+        fit: change a .npz until the robot can perform it: slower, or with its centre of mass moved.
+        out: the .npz file for the fitted motion.
 
     Returns:
-        0 if the robot can do it, 1 if it cannot.
+        0 if the robot can perform it, 1 if it cannot.
     """
     from poise.baselines.balance.references.motion import load_motion
     from poise.baselines.balance.references.robot_clip import (
@@ -97,7 +97,7 @@ def follow(
     size: tuple[int, int] = (640, 480),
     allow: Allow = (),
 ) -> int:
-    """Perform a motion, pushed or not, and say how near the robot stayed to it.
+    """Perform a motion, pushed or not, and report the tracking errors.
 
     Args:
         motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
@@ -110,9 +110,9 @@ def follow(
         push: impulse of a push at a random time of the motion [N s]; 0 for none.
         share: the same as a share of the J50 of the push's direction, standing (configs/limits).
         directions: of the pushes, spread evenly, one after the other.
-        tempo: how many times as fast the motion is played.
-        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
-        waits: let the motion wait while the robot catches itself.
+        tempo: speed factor of the motion.
+        realism: realism level: ideal, lab, field, or a .yaml file.
+        waits: let the motion wait while the robot recovers.
         fastest: find the largest tempo at which none of the trials falls.
         seed: of starts and pushes.
         out: a JSON file to write the trials to.

@@ -96,7 +96,7 @@ def convert(
         mirror: exchange left and right.
         reverse: play it backwards.
         turn: about the vertical axis [degrees].
-        close: seconds over which the end is led to the first frame.
+        close: seconds over which the end is blended into the first frame.
         loop: how many times, one after the other.
         rate: frames a second.
         robot: whose .npz it is.
@@ -292,7 +292,7 @@ def named_joints(joints: Sequence[str]) -> dict[str, str]:
 
 
 def _clip(file: Path, unit: str, up: str, forward: str, robot: str, joints: Sequence[str]) -> Clip:
-    """The clip of a BVH file, or of a robot's .npz."""
+    """Return the clip of a BVH file, or of a robot's .npz."""
     if file.suffix != ".npz":
         return read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
     from poise.baselines.balance.references.robot_clip import read_robot_clip

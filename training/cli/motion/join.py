@@ -75,12 +75,12 @@ def match(
     seconds: float = 10.0,
     start: str = "",
 ) -> None:
-    """Make a motion that does what is asked for, by motion matching; see docs/motion-synthesis.md.
+    """Make a motion that follows velocity commands, by motion matching (docs/motion-synthesis.md).
 
     Args:
         files: .bvh files or names of packaged clips, all of one skeleton. None: the packaged ones,
             with a walk of 0.3 to 1.2 m/s.
-        commands: what is asked for from a time on, as SECONDS:FORWARD,LEFT,TURN in m/s and rad/s.
+        commands: commands from a time on, as SECONDS:FORWARD,LEFT,TURN in m/s and rad/s.
         out: the .bvh file to write.
         seconds: how long the motion lasts.
         start: CLIP@SECONDS where it begins. None: the first frame of the first clip.

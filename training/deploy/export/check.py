@@ -1,4 +1,4 @@
-"""Whether an exported file does what the policy does."""
+"""Comparison of an exported file with the policy."""
 
 from pathlib import Path
 from typing import Final
@@ -16,7 +16,7 @@ TOLERANCE: Final = 1e-6  # of an action
 
 
 def observations(policy: Policy, count: int = COUNT, seed: int = 0) -> np.ndarray:
-    """(count, no) float32 random observations, within what training met and far beyond.
+    """Return (count, no) float32 random observations, within what training met and far beyond.
 
     A third is normally distributed as the observations of the training; another third spreads over
     one and a half times the limits of the normalised observation, the rest over those of the raw
@@ -33,7 +33,7 @@ def observations(policy: Policy, count: int = COUNT, seed: int = 0) -> np.ndarra
 
 
 def check_onnx(path: Path, policy: Policy, count: int = COUNT) -> float:
-    """The largest difference of an action from that of `Policy.predict`, which it returns.
+    """Return the largest difference of an action from that of `Policy.predict`, which it returns.
 
     Raises PoiseError where it is more than `TOLERANCE`, or an action is not finite.
     """

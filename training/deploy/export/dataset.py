@@ -36,9 +36,9 @@ def write_dataset(
     seed: int = 0,
     allow: str | Iterable[str] = (),
 ) -> dict[str, int]:
-    """Play trials and write them as a data set of Minari into the folder `out`.
+    """Run trials and write them as a Minari data set into the folder `out`.
 
-    Each episode is a trial. Its `infos` hold the push as arrays (`push_arrays`) and `is_success`.
+    Each episode is a trial; `infos` contain the push as arrays (`push_arrays`) and `is_success`.
     ``MINARI_DATASETS_PATH=OUT`` lets `minari.load_dataset` find it.
 
     Args:
@@ -86,7 +86,7 @@ def write_dataset(
 
 
 def _episode(agent: Agent, trial: Trial, buffer: Any) -> Any:
-    """A trial as a buffer of Minari."""
+    """Return a trial as a buffer of Minari."""
     env = agent.env
     observation, info = env.reset(seed=trial.seed, options=trial.options)
     if agent.begin is not None:

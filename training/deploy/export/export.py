@@ -101,7 +101,7 @@ def export_policy(
 
 
 def _name(policy: str | Path) -> str:
-    """The policy's name: of a run, that of its folder."""
+    """Return the policy's name: of a run, that of its folder."""
     path = Path(os.path.abspath(policy))  # not resolved: a link's name is as good as another
     return path.parent.name if path.name in ("best", "last") else path.name
 
@@ -121,7 +121,7 @@ def _settings(archive: Path) -> str:
 
 
 def tensors(policy: Policy) -> dict[str, np.ndarray]:
-    """All numbers that decide the policy's actions, by name.
+    """Return all numbers that decide the policy's actions, by name.
 
     The actor's layers have the names and the shape (out, in) that they have in SB3's state_dict.
     `observation.mean`, `.scale` (no,) and `.clip` () normalise; a symmetric policy has `.order` and
@@ -142,7 +142,7 @@ def tensors(policy: Policy) -> dict[str, np.ndarray]:
 
 
 def safetensors_bytes(policy: Policy, metadata: Mapping[str, str]) -> bytes:
-    """The file of `tensors` with these metadata; the same policy gives the same bytes."""
+    """Return the file of `tensors` with these metadata; the same policy gives the same bytes."""
     from safetensors.numpy import save
 
     return bytes(save(tensors(policy), metadata=dict(metadata)))

@@ -34,7 +34,7 @@ class Figure:
 
 
 def figures(policy: Policy, name: str, robot: Robot, result: str | Path | None) -> list[Figure]:
-    """What the run's own evaluation says of this policy, then what `result` says.
+    """Return the figures of the run's own evaluation of this policy, then those of `result`.
 
     `result` is a folder of `poise evaluate` or `poise benchmark`, or its summary.json.
 
@@ -48,7 +48,7 @@ def figures(policy: Policy, name: str, robot: Robot, result: str | Path | None) 
 
 
 def _of_training(policy: Policy) -> list[Figure]:
-    """Recovered and fallen of the held-out pushes that this checkpoint met, if it met any."""
+    """Return this checkpoint's rates of recovered and fallen held-out pushes, if evaluated."""
     rows = policy.state.get("evaluations")
     row = next((r for r in rows if _met(r, policy)), None) if isinstance(rows, list) else None
     if row is None:

@@ -43,7 +43,7 @@ class Action:
 
 
 def actions(env: BalanceEnv) -> list[Action]:
-    """The entries of the environment's action, in order."""
+    """Return the entries of the environment's action, in order."""
     limits = np.array(env.robot.torque_limit)
     if isinstance(env, PositionBalanceEnv):
         return _motors(env, env.servos.reach, "rad")
@@ -67,7 +67,7 @@ def _motors(env: BalanceEnv, scales: np.ndarray, unit: str) -> list[Action]:
 
 
 def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
-    """The metadata of a policy that acts in `env`, as texts.
+    """Return the metadata of a policy that acts in `env`, as texts.
 
     `observation_names` are terms; each has as many numbers as `observation_sizes` says, in the unit
     of `observation_units`, whose ω, h, m and g are in `units` (JSON, SI), and as a number
@@ -116,7 +116,7 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
 
 
 def units(env: BalanceEnv) -> dict[str, float]:
-    """The robot's numbers that the units of observations and actions are made of [SI]."""
+    """Return the robot's numbers that the units of observations and actions are made of [SI]."""
     scales = asdict(env.scales)
     half = {"half_support_x": scales["support_x"], "half_support_y": scales["support_y"]}
     body = {"h": scales["height"], "omega": scales["omega"]}
@@ -124,7 +124,7 @@ def units(env: BalanceEnv) -> dict[str, float]:
 
 
 def scale_of(term: Term, scales: Scales) -> str:
-    """1 over the unit of a term [1/SI]."""
+    """Return 1 over the unit of a term [1/SI]."""
     h, omega = scales.height, scales.omega
     values = {
         "1": 1.0,
@@ -147,7 +147,7 @@ def scale_of(term: Term, scales: Scales) -> str:
 
 
 def _list(values: Iterable[object]) -> str:
-    """Values with commas between them; numbers with all their digits."""
+    """Return values with commas between them; numbers with all their digits."""
     return ",".join(
         repr(float(value)) if isinstance(value, (float, np.floating)) else str(value)
         for value in values

@@ -14,7 +14,7 @@ NAME = "policy"
 
 
 def onnx_bytes(policy: Policy, metadata: Mapping[str, str]) -> bytes:
-    """The file of `policy` with these metadata; the same policy gives the same bytes.
+    """Return the file of `policy` with these metadata; the same policy gives the same bytes.
 
     `obs` (n, no) float32 are observations as the environment gives them, `actions` (n, na) float32
     are those of `Policy.predict`: the normalisation, both sides of a symmetric policy and the
@@ -102,7 +102,7 @@ class _Graph:
         return name
 
     def mirror(self, mirror: Mirror, values: str, name: str) -> str:
-        """The image that `mirror` makes of `values`."""
+        """Return the image that `mirror` makes of `values`."""
         order = self.onnx.numpy_helper.from_array(mirror.order.astype(np.int64), f"{name}.order")
         self.tensors.append(order)
         picked = self.op("Gather", values, order.name, axis=1)
@@ -119,6 +119,6 @@ class _Graph:
 
 
 def narrowed(values: np.ndarray) -> np.ndarray:
-    """The values with 32 bits if these hold them exactly; else as they are."""
+    """Return the values with 32 bits if these hold them exactly; else as they are."""
     short = values.astype(np.float32)
     return short if np.array_equal(short.astype(values.dtype), values) else values

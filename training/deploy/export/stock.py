@@ -35,8 +35,8 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
     """Write `archive` for `PPO.load`, and the statistics for `VecNormalize.load`.
 
     `env` is the policy's environment, `source` its folder. A symmetric policy becomes an ordinary
-    one that is twice as wide, and as symmetric. The optimizer begins anew. Raises PoiseError where
-    what SB3 makes of an observation differs by more than `TOLERANCE`.
+    one of twice the width that is still symmetric. The optimizer starts afresh. Raises PoiseError
+    if SB3's action for an observation differs by more than `TOLERANCE`.
     """
     import torch
     from stable_baselines3.common.vec_env import VecNormalize
@@ -62,7 +62,7 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
 
 
 def _ordinary(weights: Weights, policy: Policy) -> tuple[Weights, TrainConfig]:
-    """Weights and configuration of the policy as an ordinary one, in one environment."""
+    """Return weights and configuration of the policy as an ordinary one, in one environment."""
     ppo = replace(policy.config.ppo, n_envs=1, symmetric=False)
     if policy.mirrors is not None:
         weights = both_sides(weights, *policy.mirrors)
@@ -76,7 +76,7 @@ def _twice(widths: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def both_sides(weights: Mapping[str, np.ndarray], see: Mirror, do: Mirror) -> Weights:
-    """The weights of an ordinary network that is the mean of f and of its mirror image.
+    """Return the weights of an ordinary network that is the mean of f and of its mirror image.
 
     The first layer sees o by W and M_o o by W M_o; further ones treat both alike; the last one is
     ½ [W, M_a W], of the value ½ [W, W]. Of the logarithms of the spread it has the mean.
@@ -102,5 +102,5 @@ def _both(name: str, values: np.ndarray, see: Mirror, do: Mirror) -> np.ndarray:
 
 
 def _mean_of(values: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """A last layer, weight or bias, that gives the mean of two."""
+    """Return a last layer, weight or bias, that gives the mean of two."""
     return 0.5 * (np.concatenate([values, image], 1) if values.ndim == 2 else values + image)

@@ -1,1 +1,1 @@
-"""A policy of somebody else before anything is measured with it: what is missing, what is wrong."""
+"""Checks of an external policy before it is evaluated: what is missing, what is wrong."""

@@ -1,4 +1,4 @@
-"""All that is found out about a policy of somebody else on a robot."""
+"""All checks of an external policy on a robot."""
 
 import hashlib
 from dataclasses import dataclass
@@ -39,9 +39,9 @@ class PolicyCheck:
         known: the public policy that the network is, by its sum, or None.
         sizes: of the network.
         layouts: usual observations of its size, where nothing describes it.
-        unsaid: fields of `WORDS` that nothing says.
+        unsaid: fields of `WORDS` that are not specified.
         stood: how it stood; None where nothing describes it.
-        findings: what a rollout tells.
+        findings: results of the comparison with a rollout.
         tried: readings of what the description leaves open, where it fell or was never at rest.
         proposed: the one of them that stood best, better than what is described; or None.
         held: whether it tracks a motion whose first frame is held.
@@ -70,9 +70,9 @@ class PolicyCheck:
 def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> PolicyCheck:
     """Check a policy: a network, or whatever `controller_config` takes for one.
 
-    A network that nothing describes is not played: what a description needs is told.
+    A network without a description is not run: what a description needs is reported.
 
-    Raises ConfigError for what is no policy, or is described wrongly: in the words of the field.
+    Raises ConfigError, which names the field, for a file that is no policy or a wrong description.
     """
     path = Path(file)
     bare = is_file(path) and (is_script(path) or is_network(path))
@@ -111,7 +111,7 @@ def _holds(config: PolicyFileConfig) -> bool:
 
 
 def known_as(path: Path) -> str | None:
-    """The public policy that a network is, by its sum."""
+    """Return the public policy that a network is, by its sum."""
     digest(path, path)  # of a pointer of Git LFS, or without its data, that is said
     found = hashlib.sha256(read_bytes(path, BYTES)).hexdigest()
     for known in known_policies():
@@ -128,14 +128,14 @@ def _better(tried: list[Tried], stood: Stood) -> Tried | None:
 
 
 def _said(path: Path) -> dict[str, object]:
-    """What the metadata of an ONNX file say."""
+    """Return what the metadata of an ONNX file state."""
     if is_script(path):
         return {}
     return metadata_fields(onnx_session(path).get_modelmeta().custom_metadata_map, path)
 
 
 def _layouts(sizes: Sizes, joints: int) -> list[Layout]:
-    """Usual layouts of the largest input, the likeliest three."""
+    """Return the three likeliest layouts of the largest input."""
     given = [size for size in sizes.inputs.values() if size]
     actions = next((size for size in sizes.outputs.values() if size), None)
     if not given or actions is None:

@@ -1,4 +1,4 @@
-"""What a network's sizes tell of its observation, where nothing describes it."""
+"""Guess a network's observation from its sizes, where nothing describes it."""
 
 import math
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class Sizes:
 
     Attributes:
         inputs: name → numbers; None where they are left open.
-        outputs: name → numbers, likewise.
+        outputs: name → numbers; None where they are left open.
     """
 
     inputs: dict[str, int | None]
@@ -74,7 +74,7 @@ class Layout:
 
 
 def network_sizes(path: Path) -> Sizes:
-    """The sizes of a network; TorchScript, which is code, must have been allowed.
+    """Return the sizes of a network; TorchScript, which is code, must have been allowed.
 
     Raises ConfigError as `onnx_session` and `check_allowed` do.
     """

@@ -103,7 +103,7 @@ def _clocks(config: PolicyFileConfig) -> Iterator[tuple[str, PolicyFileConfig]]:
 
 
 def _resting(part: ObservationTerm, shown: dict[str, tuple[float, ...]]) -> ObservationTerm:
-    """A term, or those of a frame, that shows this of a clock at rest."""
+    """Return a term, or those of a frame, that shows this of a clock at rest."""
     if part.frame:
         return replace(part, frame=tuple(_resting(each, shown) for each in part.frame))
     if meaning(part) not in shown or part.at_rest is not None:
@@ -117,7 +117,7 @@ def _tried(what: str, name: str, robot: Robot, config: PolicyFileConfig) -> Trie
 
 
 def _lines(config: PolicyFileConfig) -> str:
-    """The observations of a description in YAML, one a line, and how their history lies."""
+    """Return the observations of a description in YAML, one a line, and how their history lies."""
     lines = [f"history: {config.history}"] if any(
         part.history > 1 for parts in config.inputs.values() for part in parts) else []  # fmt: skip
     lines.append("observations:")
@@ -131,7 +131,7 @@ _DEFAULTS = {f.name: to_dict(f.default) for f in fields(ObservationTerm)}
 
 
 def _flow(value: object) -> str:
-    """A term as YAML on a line, without what is as by default."""
+    """Return a term as YAML on a line, without what is as by default."""
     if isinstance(value, dict) and "term" in value:
         value = {key: each for key, each in value.items() if each != _DEFAULTS.get(key)}
     if isinstance(value, dict):
@@ -144,5 +144,5 @@ def _flow(value: object) -> str:
 
 
 def _key(key: object) -> str:
-    """A key of YAML; patterns are in quotation marks."""
+    """Return a key of YAML; patterns are in quotation marks."""
     return f'"{key}"' if "*" in str(key) else str(key)

@@ -1,4 +1,4 @@
-"""A rollout that a policy's maker recorded, and what it tells of a description."""
+"""A rollout recorded by a policy's authors, compared with its description."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,13 +23,13 @@ COMMANDED = (*COMMANDS, *CLOCKS, *MOTION_TERMS)
 
 @dataclass(frozen=True)
 class Rollout:
-    """Steps of a policy as its maker saw them: T of them.
+    """T steps of a policy, recorded by its authors.
 
     Attributes:
-        observations: (T, n) what each input of the network was given; "" stands for the only one.
-        actions: (T, na) what it answered.
-        qpos, qvel: (T, nq), (T, nv) the states, as MuJoCo has them of this robot; None: not told.
-        memories: (T, …) what it remembered before each step, by name; empty: not told.
+        observations: (T, n) values of each input of the network; "" stands for the only one.
+        actions: (T, na) its outputs.
+        qpos, qvel: (T, nq), (T, nv) states in MuJoCo's order; None: not recorded.
+        memories: (T, …) its recurrent state before each step, by name; empty: not recorded.
     """
 
     observations: dict[str, np.ndarray]
@@ -41,7 +41,7 @@ class Rollout:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was compared, whether it is right (None: that cannot be told), and by how much."""
+    """What was compared, whether it is right (None: undecided), and by how much."""
 
     what: str
     right: bool | None
@@ -51,7 +51,7 @@ class Finding:
 def read_rollout(
     path: Path, inputs: Sequence[str] = ("",), memories: Sequence[str] = ()
 ) -> Rollout:
-    """The arrays of an .npz file: `observations` and `actions`, and what else it has.
+    """Return the arrays of an .npz file: `observations` and `actions`, and what else it has.
 
     `qpos` and `qvel` are the states. Of a network that remembers the file may hold each memory
     before each step, by its name; of one with several inputs it holds each of them by its name in
@@ -77,7 +77,7 @@ def read_rollout(
 
 
 def compare(policy: PolicyFile, source: Path) -> list[Finding]:
-    """What the rollout in a file tells of a policy's network and of its observation.
+    """Return the findings of a rollout file about a policy's network and its observation.
 
     Raises ConfigError as `read_rollout`, and for observations or actions of another size.
     """
@@ -94,7 +94,7 @@ def compare(policy: PolicyFile, source: Path) -> list[Finding]:
 
 
 def _network(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
-    """Whether the network answers as it did, and remembers what it did."""
+    """Yield whether the network answers as it did, and remembers what it did."""
     network, worst = policy.network, 0.0
     apart = dict.fromkeys(rollout.memories, 0.0)
     network.reset()
@@ -121,7 +121,7 @@ def _network(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
 
 
 def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
-    """Each term of the observation, at the first place of each age."""
+    """Yield each term of the observation, at the first place of each age."""
     for name, places in policy.observer.places().items():
         for place in places:
             where = f"{place.term.term} at {place.start}:{place.start + place.size}"
@@ -134,7 +134,7 @@ def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
 def _judged(
     place: Place, name: str, policy: PolicyFile, rollout: Rollout
 ) -> tuple[bool | None, str]:
-    """Whether a term of an input is right, and what was found of it."""
+    """Return whether a term of an input is right, and what was found of it."""
     observed = rollout.observations[name][place.age + 1 :]
     shown = observed[:, place.start : place.start + place.size]
     expected = _expected(place, policy, rollout)
@@ -146,7 +146,7 @@ def _judged(
         lengths = np.linalg.norm(shown / np.array(place.term.scale), axis=1)
         worst = float(np.max(np.abs(lengths - 1.0)))
         return worst < UNIT, f"its length is 1 within {worst:.1g}"
-    return None, "cannot be told without states (qpos, qvel)"
+    return None, "undecided without states (qpos, qvel)"
 
 
 def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray | None:
@@ -173,7 +173,7 @@ def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray 
 
 
 def _lies(expected: np.ndarray, observations: np.ndarray) -> int | None:
-    """The place at which a term lies in the observations; None where it lies nowhere."""
+    """Return the place at which a term lies in the observations; None where it lies nowhere."""
     size = expected.shape[1]
     moves = np.ptp(expected, axis=0).max() > CLOSE  # constants lie everywhere
     for start in range(observations.shape[1] - size + 1) if moves else ():

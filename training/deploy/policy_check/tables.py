@@ -19,7 +19,7 @@ OPEN = {
     "history": "not said: how its history lies; each usual order was tried:",
     "clock": "not said: what its clock shows at rest; tried:",
 }
-VERDICTS = {True: "right", False: "WRONG", None: "not told"}
+VERDICTS = {True: "right", False: "WRONG", None: "undecided"}
 
 
 def print_policies(known: list[Known], console: Console) -> None:
@@ -88,7 +88,7 @@ def print_check(check: PolicyCheck, console: Console) -> None:
 
 
 def _how(stood: Stood, seconds: float) -> str:
-    """How it stood, for so many seconds."""
+    """Return how it stood, for so many seconds."""
     if stood.fell is not None:
         return f"fell after {stood.fell:.2f} s"
     return (f"stood for {seconds:g} s, {'at rest' if stood.rests else 'never at rest'}, "
@@ -115,7 +115,7 @@ def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:
         say("no usual observation has that size")
     for layout in check.layouts:
         say(f"perhaps {layout}")
-    say("nothing says what its numbers mean; a description needs, in its maker's words:")
+    say("nothing describes its observation; a description needs, in its authors' terms:")
     for name in check.unsaid:
         say(f"  {name}: {WORDS[name]}")
     say("to begin with, in a .yaml file beside it:")
@@ -123,7 +123,7 @@ def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:
 
 
 def _skeleton(check: PolicyCheck) -> str:
-    """A description with places to fill in."""
+    """Return a description with places to fill in."""
     lines = ["kind: policy-file", f"policy: {check.file.rpartition('/')[2]}"]
     lines += [f"{name}: ...  # {WORDS[name]}" for name in check.unsaid if name != "observations"]
     if check.sizes.gives_clip:
@@ -145,7 +145,7 @@ def _verdict(check: PolicyCheck) -> str:
     if check.stood is not None and check.stood.fell is not None:
         return "it does not stand: another robot, gains, order of joints, or term than its own"
     if not check.findings:
-        return ("that it stands is a sign, no proof: --rollout compares it with steps of its "
-                "maker's loop")  # fmt: skip
-    told = sum(each.right is True for each in check.findings)
-    return f"the adapter is right, as far as {told} of {len(check.findings)} findings tell"
+        return ("standing is evidence, not proof: --rollout compares it with steps recorded by its "
+                "authors")  # fmt: skip
+    right = sum(each.right is True for each in check.findings)
+    return f"the adapter is right, as far as {right} of {len(check.findings)} findings show"

@@ -86,7 +86,7 @@ class Recovery:
 
 
 def recoveries(robot: Robot, controller: str, limits: PushLimits, seed: int) -> Iterator[Recovery]:
-    """Trials without end: each of 8 directions with each of 5 impulses, then anew."""
+    """Yield trials without end: each of 8 directions with each of 5 impulses, then repeated."""
     recorder = Recorder(robot, momentum_qp_config(controller))
     env = ResidualBalanceEnv(robot, controller=recorder, pushes=None, duration=TRIAL_DURATION)
     action = np.zeros(len(env.action_names))

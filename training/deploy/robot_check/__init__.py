@@ -1,1 +1,1 @@
-"""A robot before anything is tried on it: what it can hold, and what will go wrong."""
+"""Checks of a robot description: torque margins, ankle limit, and faults to correct."""

@@ -1,4 +1,4 @@
-"""All that is known of a robot before a controller is tried on it."""
+"""All checks of a robot description before a controller runs on it."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -54,7 +54,7 @@ class RobotCheck:
         directions: margins, and pushes that a pendulum stops.
         dynamics: light joints, friction, flags.
         rest: two seconds at rest with momentum-qp.
-        notes: what was changed of the model so that it can be played.
+        notes: what was changed in the model so that it can be simulated.
         controllers: "in place" and "stepping" → which packaged ones take the robot.
     """
 
@@ -86,7 +86,7 @@ class RobotCheck:
 
     @property
     def in_place(self) -> float:
-        """Mean over the directions of the impulse that the ankles hold [N·s]."""
+        """Mean over the directions of the ankle limit [N·s]."""
         return float(np.mean([each.in_place for each in self.directions]))
 
     @property

@@ -33,7 +33,7 @@ class JointDynamics:
 
 @dataclass(frozen=True)
 class Dynamics:
-    """What of the model matters besides masses and shapes.
+    """Properties of the model that matter, other than masses and shapes.
 
     Attributes:
         timestep: of the physics [s].
@@ -89,7 +89,7 @@ def _joints(robot: Robot) -> dict[str, JointDynamics]:
 
 
 def _scenery(robot: Robot) -> tuple[str, ...]:
-    """Names of geoms of the world, besides the ground, that collide with anything."""
+    """Return the names of geoms of the world, other than the ground, that collide with anything."""
     model, found = robot.model, []
     for geom in range(model.ngeom):
         fixed = model.body_weldid[model.geom_bodyid[geom]] == 0

@@ -27,7 +27,7 @@ UNSOLVED = 0.01  # of the ticks
 
 @dataclass(frozen=True)
 class Fault:
-    """Something of a robot that will go wrong.
+    """A fault of a robot description.
 
     Attributes:
         kind: what it is, in a word or two.
@@ -216,7 +216,7 @@ def _slow_legs(check: RobotCheck) -> Iterator[Fault]:
         yield Fault(
             "slow legs",
             "against the damping of their joints the motors do not lift a foot and set it down in "
-            f"the longest step of {', '.join(names)}: feet stay in place with these",
+            f"the longest step of {', '.join(names)}: feet stay fixed with these",
             stepping=True,
         )
 

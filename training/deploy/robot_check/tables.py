@@ -73,7 +73,7 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
 
 def _rest(rest: Rest) -> str:
     if rest.refused:
-        return f"not played: {rest.refused}"
+        return f"not simulated: {rest.refused}"
     end = f"falls after {rest.duration:.2f} s" if rest.fallen else f"stands {rest.duration:.1f} s"
     return (f"{end} with {CONTROLLER}; torques change by {rest.chatter:.1f} limits/s, feet drift "
             f"{1000 * rest.foot_drift:.1f} mm, the CoM {1000 * rest.com_drift:.1f} mm, the root "
@@ -103,7 +103,7 @@ def _holding(holding: Holding) -> str:
 
 
 def _directions(check: RobotCheck) -> Table:
-    """Every other direction, and the mean over all."""
+    """Return every other direction, and the mean over all."""
     headings = ("direction", "CoM to edge [mm]", "CoP by ankles [mm]", "in place [N·s]",
                 "in place [N·s/kg]", "one step ≤ [N·s]", "one step ≤ [N·s/kg]")  # fmt: skip
     rows = (

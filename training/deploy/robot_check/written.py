@@ -18,11 +18,11 @@ HEAD = "# Guessed by poise robot from {path}: correct what is wrong; all fields:
 
 
 def load_and_write(name: str) -> tuple[Robot, Path | None]:
-    """The robot of a name, and the file of its description that was written for it, if any.
+    """Return the robot of a name, and the file of its description that was written for it, if any.
 
-    One is written to the current folder for a model alone, called as it, where there is no file
-    of that name, which may be somebody's work; what is missing in it, such as torque limits, is
-    then asked for by its name. The file has what is not the default, and the model's path relative
+    A model without a description gets one in the current folder, under the model's name, unless
+    that file exists: it may have been edited. An error then names what is missing in it, such as
+    torque limits. The file has every value that is not the default, and the model's path relative
     to its own folder: the two can be moved together.
 
     Raises ConfigError as `load_robot` and `guess`.

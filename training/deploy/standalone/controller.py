@@ -49,7 +49,7 @@ def load_standalone(
 ) -> StandaloneController | SensedController:
     """A controller or a policy that runs outside of an environment, from readings of a robot.
 
-    Without `realism` the state is told; with a level it is estimated from what sensors measure.
+    Without `realism` the state is given; with a level it is estimated from measurements.
 
     Args:
         name: as `poise evaluate` takes it: a packaged controller or policy, a .yaml file of a
@@ -59,8 +59,8 @@ def load_standalone(
         allow: what may run though a file names it, as of `load_policy`.
 
     Raises:
-        ConfigError: no such controller, robot or level, or one that is no use outside: it pulls the
-            root by a force from nowhere, or it observes the push.
+        ConfigError: no such controller, robot or level, or one that cannot run on a robot: it
+            pulls the root by an external force, or it observes the push.
     """
     body = robot if isinstance(robot, Robot) else load_robot(robot)
     agent = load_agent(name, body)
@@ -73,8 +73,8 @@ class StandaloneController(OutsideController):
     """Joint torques from readings of base and joints, the same bits as in an environment.
 
     Call `reset` once, and then `torques` every `period` seconds; hold what it returns meanwhile.
-    A model of the robot is set to each reading; all that the controller needs besides (masses,
-    CoM, contacts, what a policy observes) follows from it. Feet are on the ground where the model's
+    A model of the robot is set to each reading; everything else the controller needs (masses,
+    CoM, contacts, observations) is computed from it. Feet are on the ground where the model's
     are, so the base's height matters by the millimetre. Where `ground_wrench` is not measured, it
     is what the ground would have done with the last torques; a push in between is not in it.
 
@@ -102,7 +102,7 @@ class StandaloneController(OutsideController):
         self._call = 0
 
     def torques(self, readings: Readings) -> np.ndarray:
-        """Motor torques (nu,) [N·m], within the limits, to hold for one `period`.
+        """Return motor torques (nu,) [N·m], within the limits, to hold for one `period`.
 
         Raises ConfigError naming what is missing or no number; PoiseError before a `reset`.
         """

@@ -13,7 +13,7 @@ from .readings import Readings
 
 
 class OutsideController:
-    """A controller or a policy whose environment is stepped by what is told of a robot.
+    """A controller or a policy whose environment is set to a robot's readings.
 
     Attributes:
         name: of the controller, as it was loaded.
@@ -56,7 +56,7 @@ def check_usable(name: str, env: BalanceEnv) -> None:
     """Raise ConfigError for a controller that is no use outside of a simulation."""
     controller = env.controller if isinstance(env, ResidualBalanceEnv) else None
     if isinstance(controller, CompiledController) and controller.outputs().soft_root:
-        raise ConfigError("has a soft root: it needs a force from nowhere, which no robot has",
+        raise ConfigError("has a soft root: it needs an external force, which no robot has",
                           source=name, field="root")  # fmt: skip
     if any(term.name == "push" for term in env.terms):
         raise ConfigError("observes the push, which no sensor tells", source=name,

@@ -14,7 +14,7 @@ from poise.envs.compiled.maths.vectors import axes_of
 from poise.envs.robots.robot import Robot
 from poise.envs.sensing.measurement import Rings
 
-SOURCE = "readings"  # in what is told of them
+SOURCE = "readings"  # named as the source in error messages
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Readings:
         position: (3,) of the base's origin, world [m].
         orientation: (4,) quaternion w, x, y, z that turns the base's axes into the world's.
         velocity: (3,) of the base's origin, world axes [m/s].
-        angular_velocity: (3,) of the base, its own axes, as a gyroscope tells it [rad/s].
+        angular_velocity: (3,) of the base, its own axes, as measured by a gyroscope [rad/s].
         joint_positions: (nj,) in the order of `joint_names`, or by name [rad; m of a slide].
-        joint_velocities: (nj,) likewise [rad/s; m/s].
+        joint_velocities: (nj,) in the same order, or by name [rad/s; m/s of a slide].
         ground_wrench: (6,) of the ground on the robot since the readings before: force [N], world
             axes, then moment [N·m] about the base's origin, the base's axes; None: not measured.
     """
@@ -81,11 +81,11 @@ class Measurement:
 
     Attributes:
         attitude: (4,) quaternion w, x, y, z, or (3, 3) axes, of the root in a frame whose z is up.
-        angular_velocity: (3,) of the root, its own axes, as a gyroscope tells it [rad/s].
+        angular_velocity: (3,) of the root, its own axes, as measured by a gyroscope [rad/s].
         acceleration: (3,) specific force Rᵀ(a − g), the root's axes, as an accelerometer tells it
             [m/s²]; at rest it points up with 9.81.
         joint_positions: (nj,) in the order of `joint_names`, or by name [rad; m of a slide].
-        joint_velocities: (nj,) likewise [rad/s; m/s].
+        joint_velocities: (nj,) in the same order, or by name [rad/s; m/s of a slide].
         ground_wrench: (6,) of the ground on the robot, the root's axes: force [N], then moment
             [N·m] about the root's origin.
         contacts: (nc,) whether each sole touches the ground, in the order of `robot.soles`.
@@ -100,7 +100,7 @@ class Measurement:
     contacts: Sequence[bool] | np.ndarray
 
     def check(self, robot: Robot) -> dict[str, np.ndarray]:
-        """Every field as numbers; raises ConfigError naming what is missing or no number."""
+        """Return every field as numbers; raises ConfigError naming what is missing or no number."""
         source, names = "measurement", robot.joint_names
         return {
             "attitude": self._axes(source),
@@ -130,7 +130,7 @@ class Measurement:
 def joint_numbers(
     values: ArrayLike | Mapping[str, float], names: Sequence[str], field: str, source: str = SOURCE
 ) -> np.ndarray:
-    """(nj,) finite numbers, given in the order of `names` or by name; else ConfigError."""
+    """Return (nj,) finite numbers, given in the order of `names` or by name; else ConfigError."""
     if not isinstance(values, Mapping):
         return numbers(values, len(names), field, source)
     if missing := [name for name in names if name not in values]:
@@ -142,7 +142,7 @@ def joint_numbers(
 
 
 def numbers(values: object, count: int, field: str, source: str = SOURCE) -> np.ndarray:
-    """(`count`,) finite numbers; else ConfigError."""
+    """Return (`count`,) finite numbers; else ConfigError."""
     found = finite_array(values, (count,))
     if found is None:
         raise ConfigError(f"must be {count} finite numbers", source=source, field=field)
@@ -150,7 +150,7 @@ def numbers(values: object, count: int, field: str, source: str = SOURCE) -> np.
 
 
 def unit_quaternion(values: object, field: str, source: str = SOURCE) -> np.ndarray:
-    """(4,) of length 1, w first; else ConfigError."""
+    """Return (4,) of length 1, w first; else ConfigError."""
     turn = numbers(values, 4, field, source)
     if abs(float(np.linalg.norm(turn)) - 1.0) > 1e-3:
         raise ConfigError("must be a quaternion of length 1", source=source, field=field)

@@ -37,7 +37,7 @@ class MotorCommand(NamedTuple):
     def targets(
         self, q: np.ndarray, dq: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
     ) -> MotorCommand:
-        """The same command for motors that take targets and no torques.
+        """Return the same command for motors that take targets and no torques.
 
         Gains K', D' take the place of none, and the target q' that of the torque:
         K' (q' − q) − D' q̇ = τ at the readings q, q̇ of the motors; when these have moved on, the
@@ -62,7 +62,7 @@ class MotorCommand(NamedTuple):
 
 
 class MeasuredState(EstimatedState):
-    """The believed state of a robot whose measurements are handed over, instead of simulated.
+    """Estimated state of a robot whose measurements are passed in, not simulated.
 
     Attributes:
         start: measurements before the episode, the last one at its start.
@@ -72,11 +72,11 @@ class MeasuredState(EstimatedState):
 
     @classmethod
     def instead_of(cls, source: EstimatedState) -> MeasuredState:
-        """The same of the plant and the estimator of `source`."""
+        """Return the same of the plant and the estimator of `source`."""
         config = source.config
         if config.kind == "exact":
-            told = "exact is the true state, which no sensor gives"
-            raise ConfigError(told, field="estimator.kind", choices=("auto", "odometry", "inekf"))
+            reason = "exact is the true state, which no sensor measures"
+            raise ConfigError(reason, field="estimator.kind", choices=("auto", "odometry", "inekf"))
         if config.kind == "auto":
             config = replace(config, kind="odometry")
         state = cls(source.plant, source.plant.robot, config)
@@ -111,11 +111,11 @@ class MeasuredState(EstimatedState):
 
 
 class SensedController(OutsideController):
-    """What the motors are asked for, from measurements: the bits of the benchmark at that level.
+    """Motor commands from measurements: bit-identical to the benchmark's at that level.
 
-    The estimator and the predictor are those of the benchmark. The level of realism says what is
-    known of the robot: by how much measurements and commands are late, the motors' lag, and the
-    sensors' noise; of a range it is the middle.
+    The estimator and the predictor are those of the benchmark. The realism level defines what is
+    known of the robot: sensing delay, command delay, motor lag and sensor
+    noise; of a range the middle is used.
 
     Call `reset` once, and then `command` every `period` seconds with what was measured since.
 
@@ -140,7 +140,7 @@ class SensedController(OutsideController):
 
     @property
     def state(self) -> RobotState:
-        """What is believed of the robot, as of the last `reset` or `command`."""
+        """The estimated state as of the last `reset` or `command`."""
         return self._state.state
 
     def reset(self, start: Readings, measured: Measurement | Sequence[Measurement]) -> None:
@@ -188,18 +188,18 @@ class SensedController(OutsideController):
         return self._tick()
 
     def _tick(self) -> MotorCommand:
-        """A control tick of the environment; what it simulates besides is of no account."""
+        """Run a control tick of the environment; the rest of its simulation is not used."""
         self._act()
         env, motors = self._env, self._state.motors
-        believed, views = self._state.state_arrays, env.simulation.views
-        views.qpos[:], views.qvel[:] = believed.qpos, believed.qvel
+        estimated, views = self._state.state_arrays, env.simulation.views
+        views.qpos[:], views.qvel[:] = estimated.qpos, estimated.qvel
         env.tick()
         asked = motors.asked[(motors.written[0] - 1) % len(motors.asked)]
         return MotorCommand(*(asked[i].copy() for i in (TORQUE, TARGET, STIFFNESS, DAMPING)))
 
 
 def typical(level: Realism) -> Realism:
-    """The level with the middle of each range in its place."""
+    """Return the level with the middle of each range in its place."""
     parts = {}
     for name in PARTS[1:]:
         part = getattr(level, name)

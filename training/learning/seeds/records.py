@@ -63,7 +63,7 @@ def start_and_best(
 
 
 def read_seeds(out: Path) -> list[SeedEntry]:
-    """The runs of seeds.json; raises ConfigError naming the file."""
+    """Return the runs of seeds.json; raises ConfigError naming the file."""
     path = out / SEEDS
     runs = read_json(path).get("runs")
     if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
@@ -75,7 +75,7 @@ def read_seeds(out: Path) -> list[SeedEntry]:
 
 
 def expand_seeds(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of controllers, a folder of `poise train --seeds` replaced by those of its runs.
+    """Return names of controllers, a folder of `poise train --seeds` replaced by those of its runs.
 
     Raises ConfigError for a folder with a run that is not finished.
     """

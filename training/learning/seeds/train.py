@@ -48,7 +48,7 @@ def train_seeds(
 
     Args:
         config: of all runs, but for the seed; each has one thread.
-        seeds: all different; with `resume` those that `out` has besides are trained too.
+        seeds: all different; with `resume` other seeds found in `out` are trained too.
         out: folder of the runs, of their configuration and of seeds.json. All processes write
             there: on a cluster it is one that every machine sees.
         resume: go on with the runs that `out` holds.

@@ -1,4 +1,4 @@
-"""A candidate of `poise tune` is judged here, by how pushes and walks around the limit end."""
+"""Scores of the candidates of `poise tune`: outcomes of pushes and walks around the limit."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ from .tasks import TuneConfig, TuningWalks
 if TYPE_CHECKING:  # it loads torch
     from poise.training.learning.policy import Policy
 
-SLACK = 0.2  # by which a walk may be off what it is told
-UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not quiet, or fell
+SLACK = 0.2  # relative error of a walk's speed at which its worth is least
+UNQUIET, FALLEN = 0.6, 0.3  # largest score of a trial that is upright but not quiet, or fell
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
 
 
 def check_walks(controller: str, robot: Robot, walks: TuningWalks) -> None:
-    """Raise ConfigError for a controller that does not walk, or not as it is first told."""
+    """Raise ConfigError for a controller that does not walk, or that rejects the first commands."""
     env = ResidualBalanceEnv(robot, controller=controller_config(controller), pushes=None)
     for trial in walks.draw(0, robot, walks.first(robot)):
         env.reset(seed=trial.seed, options=trial.options)
@@ -74,7 +74,7 @@ def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> f
     """1 for a recovery, 0.6 for one that does not come to rest, at most 0.3 for a fall, by the time
     until then; less `chatter` times |Δτ|/τ_max a tick, see `TuneConfig`.
 
-    A walk counts as `_as_told`, and nothing where its own gains put what it is told out of reach.
+    A walk counts as `_as_commanded`, and 0 if the candidate's gains put the command out of range.
     With `in_place` a foot that moved (`Outcome.foot_displaced`) is no recovery.
     """
     try:
@@ -88,27 +88,27 @@ def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> f
     if outcome.fallen:
         return FALLEN * env.steps / env.max_steps - price
     if trial.command is not None:
-        return _as_told(trial.command, outcome) - price
+        return _as_commanded(trial.command, outcome) - price
     moved = in_place and outcome.foot_displaced
     return (1.0 if outcome.recovered and not moved else UNQUIET) - price
 
 
-def _as_told(command: TimedCommand, outcome: Outcome) -> float:
-    """1 for a walk as fast as it is told and turning so, 0.6 for one that is a fifth off, or more.
+def _as_commanded(command: TimedCommand, outcome: Outcome) -> float:
+    """Return 1 for a walk at the commanded speed and turn rate, 0.6 for an error ≥ 20 %.
 
-    Speeds are means of the strides, along the path: in a curve feet point beside it.
+    Speeds are means over strides, along the path: in a curve the feet do not point along it.
     """
-    told = np.hypot(command.ahead, command.left)
+    commanded = np.hypot(command.ahead, command.left)
     if outcome.speed_ahead is None or outcome.speed_left is None or outcome.turn_rate is None:
         return UNQUIET  # it has taken no strides
     speed = np.hypot(outcome.speed_ahead, outcome.speed_left)
-    off = max(abs(speed / told - 1.0) if told else 0.0,
+    off = max(abs(speed / commanded - 1.0) if commanded else 0.0,
               abs(outcome.turn_rate / command.turn - 1.0) if command.turn else 0.0)  # fmt: skip
     return float(UNQUIET + (1.0 - UNQUIET) * max(1.0 - off / SLACK, 0.0))
 
 
 def follow(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.ndarray:
-    """Limits (directions,) [N·s] nearer to where half of the pushes are recovered.
+    """Return limits (directions,) [N·s] nearer to where half of the pushes are recovered.
 
     `values` (candidates, directions, levels) is `worth`.
     """

@@ -71,12 +71,12 @@ class Gains:
                     ) from None
 
     def first(self) -> np.ndarray:
-        """(n,) where the search starts, in [0, 1]."""
+        """Return (n,) where the search starts, in [0, 1]."""
         values = _numbers(self.start)
         return np.array([gain.unit(values[gain.path]) for gain in self.gains])
 
     def at(self, units: np.ndarray) -> dict[str, object]:
-        """The controller's configuration at these coordinates."""
+        """Return the controller's configuration at these coordinates."""
         data = deepcopy(self.start)
         for gain, unit in zip(self.gains, units, strict=True):
             _put(data, gain.path, gain.value(float(unit)))

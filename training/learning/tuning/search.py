@@ -36,8 +36,8 @@ AVERAGED = 16  # generations whose better halves the result is the mean of
 class Generation(TypedDict):
     """A line of the history: where the candidates were, and the `worth` of their trials.
 
-    `units` (candidates, gains); `alone` and `below` (candidates, trials), of no trials where none
-    were played; `limits` (2, directions) [N·s] after it.
+    `units` (candidates, gains); `alone` and `below` (candidates, trials), empty where no trials
+    were run; `limits` (2, directions) [N·s] after it.
     """
 
     generation: int
@@ -74,10 +74,10 @@ def tune(
     all that was tried, from which `resume` goes on as if nothing had happened. A controller from
     outside (``module:Class``) that the configuration or the policy names must be among `allow`.
     No generation begins that would end later than `minutes` after the first one of this call
-    began, if the ones before are a measure; one is always played.
+    began, as estimated from the earlier ones; at least one is run.
 
-    Raises ConfigError for a configuration that is not valid or names what is not allowed, walks
-    that the controller cannot be told where the search starts, `minutes` that are not above 0, a
+    Raises ConfigError for a configuration that is not valid or names what is not allowed, walks out
+    of the controller's range where the search starts, `minutes` that are not above 0, a
     folder that holds another search, or where the library `cma` is missing; PoiseError when another
     process searches there, or a file cannot be written.
     """
@@ -112,7 +112,7 @@ def tune(
 
 
 def _known(config: TuneConfig, out: Path, resume: bool) -> list[Generation]:
-    """The generations that an earlier call has tried."""
+    """Return the generations that an earlier call has tried."""
     check_resume(out, resume, is_file(out / CONFIG), "a search", "search")
     if not resume:
         return []
@@ -152,7 +152,7 @@ class _Search:
         self.centres: list[np.ndarray] = []
 
     def step(self, executor: Executor) -> Generation:
-        """A generation; returns its line of the history."""
+        """Return a generation; returns its line of the history."""
         config, limits = self.config, self.limits
         units = [np.asarray(u) for u in self.cma.ask()]
         seeds = [config.seed + 100_000 * (2 * self.generation + k + 1) for k in range(2)]
@@ -176,7 +176,7 @@ class _Search:
         return row
 
     def again(self, row: Generation, source: Path) -> None:
-        """A generation that has been played before."""
+        """Restore a generation that has been evaluated before."""
         units = [np.asarray(u) for u in self.cma.ask()]
         try:
             same = np.allclose(units, row["units"], rtol=0.0, atol=1e-12)
@@ -190,7 +190,7 @@ class _Search:
         self._take(units, row)
 
     def _are_worths(self, values: list[list[float]]) -> bool:
-        """True if these are values of all candidates and tasks, or of no tasks."""
+        """Return True if these are values of all candidates and tasks, or of no tasks."""
         found = np.asarray(values, float)
         trials = len(self.limits[0]) * len(self.config.tasks.levels)
         sizes = [(self.config.population, count) for count in (0, trials)]
@@ -216,7 +216,7 @@ class _Search:
         self.generation += 1
 
     def words(self, row: Generation) -> str:
-        """A line for the terminal."""
+        """Return a line for the terminal."""
         text = f"generation {self.generation} of {self.config.generations}"
         text += f": score {self.scores.mean():.2f}, best {self.scores.max():.2f}"
         agents = ("alone", row["alone"]), (f"under {self.config.policy}", row["below"])

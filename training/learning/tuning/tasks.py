@@ -1,7 +1,7 @@
-"""What a search is told, and what its candidates meet: pushes around a limit, or walks.
+"""Settings of a search and the trials of its candidates: pushes around a limit, or walks.
 
 All of a generation meet the same; every generation draws new ones. The limit of each direction, or
-the speed of each command, follows the candidates: it rises while they master more than half.
+the speed of each command, follows the candidates: it rises while they succeed in more than half.
 """
 
 from dataclasses import dataclass, field, replace
@@ -40,11 +40,11 @@ class TuningPushes:
         _check_levels(self.levels)
 
     def first(self, robot: Robot) -> np.ndarray:
-        """The limit of each direction in the first generation [N·s]."""
+        """Return the limit of each direction in the first generation [N·s]."""
         return np.full(len(self.directions), self.impulse * robot.mass)
 
     def draw(self, seed: int, robot: Robot, limits: np.ndarray) -> list[Trial]:
-        """Trials, direction by direction; directions are jittered, so that all angles occur.
+        """Return trials, direction by direction; directions are jittered, so that all angles occur.
 
         `limits` [N·s] has one for each.
         """
@@ -60,7 +60,7 @@ class TuningPushes:
         return trials
 
     def words(self, who: str, limits: np.ndarray) -> str:
-        """What half of the candidates master, for the terminal."""
+        """Return a line for the terminal: what half of the candidates recover from or follow."""
         return f"half recovered {who} at {limits.mean():.1f} N·s (worst {limits.min():.1f})"
 
 
@@ -68,7 +68,7 @@ class TuningPushes:
 class TuningWalks:
     """Walks of a generation: `levels` times the speed found so far, of each of `commands`.
 
-    A command is told from the start on, by chance to the one or the other side. Its speeds are
+    A command applies from the start of the trial, to the left or right at random. Its speeds are
     those of the first generation.
     """
 
@@ -82,26 +82,27 @@ class TuningWalks:
         _check_levels(self.levels)
 
     def first(self, robot: Robot) -> np.ndarray:
-        """How many times as fast as it says each command is told in the first generation."""
+        """Return the speed factor of each command in the first generation."""
         return np.ones(len(self.commands))
 
     def draw(self, seed: int, robot: Robot, limits: np.ndarray) -> list[Trial]:
-        """Trials, command by command; `limits` are how many times as fast each is told."""
+        """Return trials, command by command; `limits` are the speed factors of the commands."""
         rng = np.random.default_rng(seed)
         trials: list[Trial] = []
         for command, limit in zip(self.commands, limits, strict=True):
             for level in self.levels:
                 fast, side = float(level * limit), float(rng.choice((-1.0, 1.0)))
-                told = replace(command, ahead=fast * command.ahead,
-                               left=side * fast * command.left,
-                               turn=side * fast * command.turn)  # fmt: skip
+                scaled = replace(command, ahead=fast * command.ahead,
+                                 left=side * fast * command.left,
+                                 turn=side * fast * command.turn)  # fmt: skip
                 number = len(trials)
-                trials.append(Trial(number, seed + number, commands=(told,), limit_fraction=level))
+                walk = Trial(number, seed + number, commands=(scaled,), limit_fraction=level)
+                trials.append(walk)
         return trials
 
     def words(self, who: str, limits: np.ndarray) -> str:
-        """What half of the candidates master, for the terminal."""
-        return (f"half walk {who} at {limits.mean():.2f} of what is told "
+        """Return a line for the terminal: what half of the candidates recover from or follow."""
+        return (f"half walk {who} at {limits.mean():.2f} of the command "
                 f"(worst {limits.min():.2f})")  # fmt: skip
 
 
@@ -119,10 +120,10 @@ class TuneConfig:
         gains: the range of each number that is searched, by its path in the controller's
             configuration (``com.weight``); on a log scale if both ends are above 0.
         pushes: what candidates meet, unless there are `walks`.
-        walks: what they are told instead, of a controller that walks.
+        walks: commands used instead, for a controller that walks.
         policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
         in_place: a foot that moves is no recovery.
-        realism: name or file of the level that trials are played at.
+        realism: name or file of the realism level of the trials.
         chatter: what a trial's worth loses for torques that change by their limit in every tick.
         generations, population, spread: of CMA-ES; spread is the first standard deviation, as a
             fraction of each range.

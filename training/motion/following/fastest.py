@@ -1,4 +1,4 @@
-"""How fast a motion may be played until a controller falls."""
+"""Largest speed factor of a motion at which a controller does not fall."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ from poise.envs.robots.robot import Robot
 
 from .follow import Followed, follow
 
-STEP = 0.05  # of the tempo that is told
+STEP = 0.05  # resolution of the reported tempo
 STARTS = 5
 MOST = 4.0  # times as fast, at most
 
@@ -22,7 +22,7 @@ def fastest(
     seed: int = 0,
     say: Callable[[float, list[Followed]], object] = lambda tempo, trials: None,
 ) -> float:
-    """The largest tempo, in steps of 0.05 and up to 4, at which no trial of `starts` falls.
+    """Return the largest tempo, in steps of 0.05 and up to 4, at which no trial of `starts` falls.
 
     It is bisected between tempos of which the one is followed and the other is not, as if there
     were one limit: that nothing between falls is not tried. 0 if the motion falls at a tenth of
@@ -58,7 +58,7 @@ def fastest(
 
 
 def find_fastest(motion: str, controller: str, robot: str, starts: int, seed: int) -> float:
-    """The same with a line for each tempo and one for what was found."""
+    """Return the same with a line for each tempo and one for what was found."""
 
     def say(tempo: float, trials: list[Followed]) -> None:
         fallen = sum(trial.fallen for trial in trials)

@@ -39,10 +39,10 @@ class Followed(TrackingFigures):
     fallen: bool  #: whether the robot fell
     solver_failures: int  #: ticks without a solution of the QP
     push: dict[str, Any] | None  #: as an environment takes it; None for none
-    #: of a walk the way along its headings over that which is told while the clip plays; NaN where
+    #: distance walked along the heading over the commanded distance, during the clip; NaN if
     #: that is less than 0.2 m
     walked: float = np.nan
-    turned: float = np.nan  #: the same of the turn; NaN where less than 0.2 rad is told
+    turned: float = np.nan  #: the same of the turn; NaN if less than 0.2 rad is commanded
 
 
 def follow(
@@ -71,9 +71,9 @@ def follow(
     `share` the impulse is that share of the J50 that the robot's file of limits has for the
     direction: what momentum-qp stands half of.
 
-    The motion is played `speed` times as fast, and waits as `tempo` says. `watch` gives, for a
-    trial, what is called with the environment after the reset and after every step. Without
-    `patient` the first fall is the last trial. `realism` is a level, by name or file.
+    The motion runs `speed` times as fast, and waits as `tempo` defines. `watch(trial)` returns
+    what is called with the environment after the reset and after every step. Without
+    `patient` the first fall ends the trials. `realism` is a level, by name or file.
 
     Raises:
         ConfigError: no such motion, controller or robot, one that does not play motions, counts
@@ -114,35 +114,36 @@ def follow(
 
 
 class Course:
-    """Where a robot walks while it is told to: to be called as a `Watch`, and to call another."""
+    """Path of a robot while a walk is commanded: a `Watch` that also calls another."""
 
     def __init__(self, commands: np.ndarray | None, other: Watch | None = None):
-        self._told, self._other = commands, other
+        self._commands, self._other = commands, other
         self._gone: list[tuple[float, float, float]] = []
 
     def __call__(self, env: BalanceEnv) -> object:
-        told, state = self._told, env.simulation.state
-        if told is not None and told[1, START] <= env.simulation.time <= told[-1, START]:
+        commands, time = self._commands, env.simulation.time
+        if commands is not None and commands[1, START] <= time <= commands[-1, START]:
+            state = env.simulation.state
             heading = np.arctan2(state.heading[1], state.heading[0])
             self._gone.append((*state.com[:2], heading))
         return None if self._other is None else self._other(env)
 
     def shares(self) -> tuple[float, float]:
         """`walked` and `turned` of `Followed`."""
-        if self._told is None or len(self._gone) < 2:
+        if self._commands is None or len(self._gone) < 2:
             return np.nan, np.nan
-        gone, told = np.array(self._gone), self._told[1:]
+        gone, commands = np.array(self._gone), self._commands[1:]
         yaw = np.unwrap(gone[:, 2])
         axes = np.column_stack([np.cos(yaw), np.sin(yaw)])[1:]
         way = float((np.diff(gone[:, :2], axis=0) * axes).sum())
-        asked = np.diff(told[:, START]) @ told[:-1, [AHEAD, TURN]]
+        asked = np.diff(commands[:, START]) @ commands[:-1, [AHEAD, TURN]]
         done = np.array([way, yaw[-1] - yaw[0]])
         shares = np.where(np.abs(asked) > LITTLE, done / np.where(asked == 0.0, 1.0, asked), np.nan)
         return float(shares[0]), float(shares[1])
 
 
 def _followed(outcome: Outcome, trial: Trial) -> Followed:
-    """The figures of a trial that has been played."""
+    """Return the figures of a finished trial."""
     names = TrackingFigures.__dataclass_fields__
     values = {name: getattr(outcome, name) for name in names}
     return Followed(
@@ -162,7 +163,7 @@ def performer(
     tempo: Tempo | None = None,
     realism: str | Path | None = None,
 ) -> Agent:
-    """An agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
+    """Return an agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
 
     `fall` are its `FallLimits`; by default lower than the motion ever is, or further from upright.
 

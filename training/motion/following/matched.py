@@ -59,14 +59,14 @@ class Commands:
     commands: tuple[Command, ...]
 
     def __call__(self, time: float) -> Command:
-        """The command at a time [s]."""
+        """Return the command at a time [s]."""
         return self.commands[bisect_right(self.times, time + 1e-9)]
 
 
 def matched(
     files: Sequence[str], commands: Sequence[str], seconds: float, start: str = ""
 ) -> tuple[Matched, MatchingDatabase]:
-    """The motion that does what is asked for, of clips of one skeleton.
+    """Return the motion that follows the commands, made of clips of one skeleton.
 
     Args:
         files: .bvh files or names of packaged clips; none for the packaged ones, walks too.
@@ -121,7 +121,7 @@ def beyond(command: Command, database: MatchingDatabase) -> Command | None:
 def print_matched(
     made: Matched, database: MatchingDatabase, commands: Commands, console: Console
 ) -> None:
-    """What is played of which clip, how fast the whole goes, and what becomes of each command."""
+    """Print which parts of which clips are used, the speed, and how well each command is met."""
     dt = database.clips[0].dt
     rows = (
         (database.clips[piece.clip].name, f"{piece.first * dt:.2f} s", f"{piece.last * dt:.2f} s",
@@ -143,14 +143,14 @@ def print_matched(
 
 
 def _said(command: Command) -> str:
-    """A command in words, without what it leaves out."""
+    """Return a command in words, without what it leaves out."""
     others = ((command.left, "m/s left"), (command.turning, "rad/s"))
     said = [f"{value:.2f} {unit}" for value, unit in others if abs(value) >= 0.005]
     return ", ".join([f"{command.forward:.2f} m/s", *said])
 
 
 def _place(database: MatchingDatabase, names: Sequence[str], text: str) -> tuple[int, int]:
-    """The number of a clip and of a frame in it."""
+    """Return the number of a clip and of a frame in it."""
     name, at, seconds = text.rpartition("@")
     known = {name: i for i, name in enumerate(names)}
     try:

@@ -32,7 +32,7 @@ class Repertoire:
     clips: dict[str, RobotClip]  #: name → the robot's postures, of those that are not keyframes
 
     def write(self, folder: Path) -> None:
-        """Keep the clips in the folder of the results; raises PoiseError when the disk refuses."""
+    """Keep the clips in the folder of the results; raises PoiseError if they cannot be written."""
         for name, clip in self.clips.items():
             (folder / FOLDER).mkdir(exist_ok=True)
             write_robot_clip(clip, kept(folder, name))
@@ -44,17 +44,18 @@ def kept(folder: Path, name: str) -> Path:
 
 
 def is_clip(name: str) -> bool:
-    """True for what is a robot's postures, or becomes that; false for keyframes."""
+    """Return True for what is a robot's postures, or becomes that; false for keyframes."""
     return name in known_clips() or Path(name).suffix.lower() in (".npz", ".bvh")
 
 
 def load_repertoire(
-    names: Sequence[str], labels: Sequence[str], robot: Robot, folder: Path, anew: bool = False
+    names: Sequence[str], labels: Sequence[str], robot: Robot, folder: Path, fresh: bool = False
 ) -> Repertoire:
-    """The motions of these `names`, called `labels`.
+    """Return the motions of these `names`, called `labels`.
 
-    A packaged clip is put on the robot, which takes a second or so, unless `folder` has kept it;
-    with `anew` it is in any case. So is a ``.bvh`` file. A ``.npz`` file is the motion itself.
+    A packaged clip is retargeted to the robot, which takes about a second, unless `folder` has
+    kept it; with `fresh` it is retargeted again. So is a ``.bvh`` file. A ``.npz`` file is the
+    motion itself.
 
     Raises:
         ConfigError: no such motion, one of another robot, one that cannot be followed; a clip
@@ -64,7 +65,7 @@ def load_repertoire(
     clips: dict[str, RobotClip] = {}
     for name, label in zip(names, labels, strict=True):
         if is_clip(name):
-            clips[label] = clip = _clip(name, robot, kept(folder, label), anew)
+            clips[label] = clip = _clip(name, robot, kept(folder, label), fresh)
             durations[label] = reference_from(clip, robot, name).duration
             content = [f"{clip.dt!r} {clip.qpos.shape}".encode(), clip.qpos.tobytes()]
         else:
@@ -74,10 +75,10 @@ def load_repertoire(
     return Repertoire(durations, digests, clips)
 
 
-def _clip(name: str, robot: Robot, stored: Path, anew: bool) -> RobotClip:
-    """The robot's postures of a packaged clip, a .bvh or a .npz file."""
+def _clip(name: str, robot: Robot, stored: Path, fresh: bool) -> RobotClip:
+    """Return the robot's postures of a packaged clip, a .bvh or a .npz file."""
     if Path(name).suffix == ".npz":
         return read_robot_clip(name)
-    if name in known_clips() and is_file(stored) and not anew:
+    if name in known_clips() and is_file(stored) and not fresh:
         return read_robot_clip(stored)
     return retarget(read_bvh(find_bvh(name)).clip, robot).clip

@@ -1,4 +1,4 @@
-"""What a person reads of motion graphs and of plans."""
+"""Printed tables of motion graphs and of plans."""
 
 from rich.console import Console
 from rich.markup import escape

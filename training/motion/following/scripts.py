@@ -33,7 +33,7 @@ def open_synthesis(
     least: float | None = None,
     script: Script | None = None,
 ) -> Synthesis:
-    """The clips of a graph, or the packaged ones, ready for scripts.
+    """Return the clips of a graph, or the packaged ones, ready for scripts.
 
     For a robot packaged motions with steps are loaded where the script names them: in the ways of
     others they have no place.
@@ -44,7 +44,7 @@ def open_synthesis(
         kind: of transitions that scripts leave open; None for `physical` with a robot, else
             `insert`.
         least: shortest transition of the packaged clips [s].
-        script: that is to be played.
+        script: to perform.
 
     Raises:
         ConfigError: a graph of another robot, a clip that changed, `physical` without a robot; as
@@ -60,10 +60,11 @@ def open_synthesis(
                               source=file, field="robot")  # fmt: skip
         loaded = load_clips([_beside(clip.file, file) for clip in made.clips], body,
                        [clip.name for clip in made.clips])  # fmt: skip
-        for told, (found, _) in zip(made.clips, loaded, strict=True):
-            if told.digest and told.digest != found.digest:
-                raise ConfigError(f"is not the file that it was: {told.file}; make the graph again",
-                                  source=file, field=f"clips.{told.name}")  # fmt: skip
+        for recorded, (found, _) in zip(made.clips, loaded, strict=True):
+            if recorded.digest and recorded.digest != found.digest:
+                raise ConfigError(
+                    f"is not the file that it was: {recorded.file}; make the graph again",
+                    source=file, field=f"clips.{recorded.name}")  # fmt: skip
         return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
                          robot_joins=joins)  # fmt: skip
     names = packaged_clips()
@@ -85,7 +86,7 @@ def open_synthesis(
 def load_clips(
     files: Sequence[str], robot: Robot | None, names: Sequence[str] | None = None
 ) -> list[tuple[GraphClip, Clip]]:
-    """The clips of files with what a graph keeps of them; see `load_clip`."""
+    """Return the clips of files with what a graph keeps of them; see `load_clip`."""
     loaded = []
     for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
         clip, digest = load_clip(file, robot)
@@ -94,7 +95,7 @@ def load_clips(
 
 
 def _beside(file: str, graph_file: Path) -> str:
-    """A clip's file, looked for beside the graph's file too."""
+    """Return a clip's file, looked for beside the graph's file too."""
     beside = graph_file.parent / file
     return str(beside) if Path(file).suffix and not is_file(file) and is_file(beside) else file
 

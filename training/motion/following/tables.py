@@ -1,4 +1,4 @@
-"""What a person reads of followed motions and of retargeting."""
+"""Printed tables of followed motions and of retargeting."""
 
 from collections.abc import Sequence
 
@@ -18,10 +18,10 @@ from poise.training.running.tables import fact_table, text_table
 from .follow import Followed
 
 ERRORS = {*Followed.__dataclass_fields__} - {"motion_delay"}
-#: of a walk, whose way is told, and of every motion
+#: of a walk, whose path is commanded, and of every motion
 FIGURES = (
-    Figure("walked", "walked", ".1f", "%", "of the way that was told", 100.0),
-    Figure("turned", "turned", ".1f", "%", "of the turn that was told", 100.0),
+    Figure("walked", "walked", ".1f", "%", "of the commanded distance", 100.0),
+    Figure("turned", "turned", ".1f", "%", "of the commanded turn", 100.0),
     *(each for each in PERFORMED if each.key in ERRORS),
 )
 
@@ -41,7 +41,7 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
 
 
 def _unit(metres: float) -> str:
-    """The unit of a file, by name where it has one."""
+    """Return the unit of a file, by name where it has one."""
     named = [name for name, length in UNITS.items() if abs(length / metres - 1.0) < 1e-9]
     return f"{named[0]} ({metres:g} m)" if named else f"{metres:.4g} m, so that legs are {LEG} m"
 
@@ -56,7 +56,7 @@ def print_clip(clip: Clip, axes: FileAxes, console: Console) -> None:
         ("unit, up, forward", f"{_unit(axes.unit)}, {up}, {forward}"),
         ("legs", f"{clip.skeleton.leg_length:.3f} m"),
         ("planted, left and right", "{:.0%}, {:.0%}".format(*contacts.planted.mean(axis=0))),
-        ("feet stay in place", f"{'yes' if contacts.in_place else 'no'}, they move by "
+        ("feet fixed", f"{'yes' if contacts.in_place else 'no'}, they move by "
          f"{100 * contacts.wander.max():.1f} cm"),
         ("skating, mean and largest", f"{100 * contacts.skating:.1f}, "
          f"{100 * contacts.skating_largest:.1f} cm/s"),
@@ -113,10 +113,10 @@ def _steps(made: RetargetedClip) -> str:
 
 
 def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
-    told = made.clip.commands
-    if told is None:
+    commands = made.clip.commands
+    if commands is None:
         return []
-    ahead, left, turn = np.abs(told[:, 1:4]).max(axis=0)
+    ahead, left, turn = np.abs(commands[:, 1:4]).max(axis=0)
     planted = made.clip.planted
     run = planted is not None and not planted.any(axis=1).all()
     return [

@@ -35,7 +35,7 @@ CLIPS = (".npz", ".csv")
 
 
 def tracker_config(controller: str) -> PolicyFileConfig | None:
-    """The configuration of a tracker; None for any other controller.
+    """Return the configuration of a tracker; None for any other controller.
 
     Raises ConfigError as `controller_config`.
     """
@@ -132,7 +132,7 @@ def _followed(
 
 
 def _start(env: ResidualBalanceEnv, track: MotionTrack, seed: int) -> np.ndarray:
-    """(nq,) the clip's first frame, its joints disturbed, with no sole below the ground."""
+    """Return (nq,) the clip's first frame, its joints disturbed, with no sole below the ground."""
     qpos = track.course.clip.qpos[0].copy()
     qpos[7:] += np.random.default_rng((seed, 1)).normal(0.0, START_NOISE, len(qpos) - 7)
     data = mujoco.MjData(env.robot.model)

@@ -56,7 +56,7 @@ def compare_gaits(
     say: Say = print,
     allow: str | Iterable[str] = (),
 ) -> list[GaitFigures]:
-    """Let controllers walk at the same commands from the same starts, and write what came of it.
+    """Run walking controllers on the same commands and initial states; write the outcomes.
 
     `out` gets gaits.json and stance_knee.png, and with `pushed` the folder walk-push.
 
@@ -129,7 +129,7 @@ KNOWN = ("lip", "rigid", "spring", "double")  #: models that have a packaged con
 def walk_at(
     agent: Agent, speed: float, starts: int, seed: int, band: KneeMoment, tick: float | None
 ) -> GaitFigures:
-    """The figures of an agent at one speed."""
+    """Return the figures of an agent at one speed."""
     commands = parse_commands({"ahead": speed}, "command")
     outcomes, stances = [], []
     for k in range(starts):
@@ -148,7 +148,7 @@ def figures_of(
     band: KneeMoment,
     tick: float | None,
 ) -> GaitFigures:
-    """The figures of walks: falls of all of them, the rest of those that did not fall."""
+    """Return the figures of walks: falls of all of them, the rest of those that did not fall."""
     stood = [outcome for outcome in outcomes if not outcome.fallen]
     found: dict[str, Any] = {
         key: mean_or_none([getattr(each, key) for each in stood]) for key in MEANS

@@ -34,7 +34,7 @@ DURATION = 29.0  # [s]
 
 
 def record_walk() -> Clip:
-    """The clip: the same bits on one machine, nearly the same on others.
+    """Return the clip: the same bits on one machine, nearly the same on others.
 
     Raises RuntimeError if the robot falls.
     """

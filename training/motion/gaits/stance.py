@@ -55,7 +55,7 @@ class StanceRecord:
         self._rows.append(Row(env.simulation.time, down, torques, float(force), height))
 
     def stances(self, since: float) -> Stances:
-        """The whole stances that begin `since` [s] or later."""
+        """Return the whole stances that begin `since` [s] or later."""
         time, down, knees, force, height = (np.array(c) for c in zip(*self._rows, strict=True))
         spans = [
             (foot, first, last)
@@ -78,5 +78,5 @@ def _spans(down: np.ndarray, time: np.ndarray, since: float) -> list[tuple[int, 
 
 
 def _resampled(values: np.ndarray) -> np.ndarray:
-    """(51,) values over a stance whose time is normalised."""
+    """Return (51,) values over a stance whose time is normalised."""
     return np.interp(np.linspace(0.0, 1.0, POINTS), np.linspace(0.0, 1.0, len(values)), values)

@@ -13,11 +13,11 @@ from poise.envs.physics.state import RobotState
 from .reference import ReferenceBodies, Stance
 from .steps import NONE, StepErrors, StepFigures
 
-LAST = 1.0  # [s] of a trial whose error is told apart
+LAST = 1.0  # [s] at the end of a trial whose error is reported separately
 COUNTED = 0.5  # [s] after the motion's end until which errors count
 AFTER = 3.0  # [s] that a trial goes on after the motion's end: a fall takes its time
 SETTLING = 6.0  # [s] that it goes on after a push at least: steps home take as long
-LIFTED = 5  # policy steps off the ground after which a sole lands anew: 0.1 s
+LIFTED = 5  # policy steps off the ground after which a sole counts as landing again: 0.1 s
 LANDING = 25  # policy steps after which feet of a disturbed start have landed
 ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an episode
 
@@ -80,7 +80,7 @@ class Tracking:
             self._counted += env.motion_time < env.motion.duration + COUNTED
 
     def figures(self) -> TrackingFigures:
-        """What has been so far."""
+        """Return the figures so far."""
         period = self._env.config.policy_period
         table = np.array(self._errors).reshape(-1, 4)
         last = table[-round(LAST / period) :]
@@ -108,8 +108,8 @@ class Footing:
         stance: of the soles now, or when both were last on the ground.
         slide: largest distance of a sole from where it last landed [m].
 
-    A sole that has been off the ground for 0.1 s (`LIFTED` policy steps) lands anew where it
-    touches the ground; one that loses contact for less slides on.
+    A sole that has been off the ground for 0.1 s (`LIFTED` policy steps) lands again where
+    it touches the ground; one that loses contact for a shorter time keeps sliding.
     """
 
     def __init__(self, state: RobotState):
@@ -127,15 +127,15 @@ class Footing:
             self._landed = state.sole_points.copy()
         if self._landed is not None:
             down = np.asarray(state.contacts) > 0.0
-            anew = down & (self._off >= LIFTED)
-            self._landed[anew] = state.sole_points[anew]
+            landing = down & (self._off >= LIFTED)
+            self._landed[landing] = state.sole_points[landing]
             self._off = np.where(down, 0, self._off + 1)
             ways = np.linalg.norm((state.sole_points - self._landed)[:, :2], axis=1)
             self.slide = max(self.slide, float(ways[down].max(initial=0.0)))
 
 
 def lies(env: ResidualBalanceEnv) -> bool:
-    """True if the CoM is too low or the root leans too far for the motion at this time."""
+    """Return True if the CoM is too low or the root leans too far for the motion at this time."""
     state, limits = env.simulation.state, FallLimits()
     sample = env.motion.sample(env.motion_time)
     low = state.com[2] - state.origin[2] < limits.height * sample.com_offset[2]

@@ -27,7 +27,7 @@ class Stance(NamedTuple):
 
     @classmethod
     def of(cls, state: RobotState) -> Stance:
-        """The stance of a robot at this moment."""
+        """Return the stance of a robot at this moment."""
         return cls(state.sole_points.copy(), state.sole_axes.copy(), state.heading.copy())
 
     @property
@@ -131,7 +131,7 @@ class ReferenceBodies:
         return self._data.xpos.copy(), self._data.xquat.copy()
 
     def _miss(self, stance: Stance, com: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(15,) misses of CoM and soles [m, rad], and their (15, nv) Jacobian."""
+        """Return (15,) misses of CoM and soles [m, rad], and their (15, nv) Jacobian."""
         robot, data, model = self.robot, self._data, self.robot.model
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
@@ -151,7 +151,7 @@ class ReferenceBodies:
 
 
 def _leg_dofs(robot: Robot) -> np.ndarray:
-    """The degrees of freedom that move one sole and not the other."""
+    """Return the degrees of freedom that move one sole and not the other."""
     model, data = robot.model, mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
     mujoco.mj_kinematics(model, data)

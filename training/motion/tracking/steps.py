@@ -1,4 +1,4 @@
-"""How near the feet stay to a motion with steps: in the air, at touchdown, and planted."""
+"""Foot errors of a motion with steps: in swing, at touchdown, and planted."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from poise.baselines.motion.performing.motion_step import MotionStep
 class StepFigures:
     """Errors of the feet while a motion is performed as its schedule says; NaN without steps."""
 
-    swing_error: float  #: root mean square distance of a sole in the air from the motion's [m]
+    swing_error: float  #: root mean square distance of a swing foot's sole from the motion's [m]
     #: largest horizontal distance of a sole from where it is to be when it is planted, at the first
     #: policy step on both feet [m]
     placement_error: float
@@ -72,7 +72,7 @@ class StepErrors:
             self._slide = max(self._slide, float(np.linalg.norm((point - rest)[:2])))
 
     def figures(self) -> StepFigures:
-        """What has been so far."""
+        """Return the figures so far."""
         controller = self._env.controller
         performance = controller.performance if isinstance(controller, MotionStep) else None
         if performance is None:

@@ -29,7 +29,7 @@ def check_video(path: str | Path) -> None:
 def encoded(
     path: Path, size: tuple[int, int], rate: float
 ) -> Iterator[Callable[[np.ndarray], None]]:
-    """FFmpeg: yields what takes the frames; the file takes its name when the block ends well.
+    """Run FFmpeg: yield a sink for frames; the file gets its name when the block succeeds.
 
     Raises PoiseError if the file cannot be written.
     """
@@ -61,7 +61,7 @@ def encoded(
 
 @contextmanager
 def _reported(path: Path) -> Iterator[None]:
-    """FFmpeg's troubles as an error of ours."""
+    """Turn FFmpeg's errors into PoiseError."""
     try:
         yield
     except (OSError, RuntimeError) as error:

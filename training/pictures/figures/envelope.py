@@ -44,7 +44,7 @@ def polar_envelope(
         out: PNG file to write, or a place in a page.
         series: x are directions, counter-clockwise from forward, in any order [°]; intervals are
             bands. Bounds are hollow, with an arrow to the side where the true J50 is.
-        ankle_limit: (directions [°], limit), the impulse that the ankles alone can hold.
+        ankle_limit: (directions [°], limit), the largest impulse that ankles alone resist.
         step_limits: name → the same for what a number of steps can stop; far out it is cut off.
         marked: for a small picture of this one alone, without words, in which the others are faint.
         note: a sentence below the title, of what is not drawn.
@@ -106,7 +106,7 @@ def polar_envelope(
 
 
 def right_angle(direction: float) -> str:
-    """The name of a right angle, such as "left" for 90; degrees for all others."""
+    """Return the name of a right angle, such as "left" for 90; degrees for all others."""
     angle = round(direction)
     return towards(angle) if angle in range(0, 360, 90) else f"{direction:g}°"
 

@@ -1,4 +1,4 @@
-"""What a policy recovers against the environment steps that it has learned from."""
+"""J50 of a policy over its environment steps of training."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -51,7 +51,7 @@ def picture_size(graph: MotionGraph) -> float:
 
 
 def best_coefficients(graph: MotionGraph) -> np.ndarray:
-    """(n, n) K of the cheapest transition of each pair; NaN where there is none."""
+    """Return (n, n) K of the cheapest transition of each pair; NaN where there is none."""
     table = np.full((len(graph.names),) * 2, np.nan)
     for i, before in enumerate(graph.names):
         for j, after in enumerate(graph.names):
@@ -61,7 +61,7 @@ def best_coefficients(graph: MotionGraph) -> np.ndarray:
 
 
 def reason_of(text: str) -> str:
-    """The key of `REASONS` of a pair that is refused."""
+    """Return the key of `REASONS` of a pair that is refused."""
     first = text.split()[0].rstrip(",") if text else ""
     return first if first in REASONS else ""
 
@@ -125,5 +125,5 @@ def _strength(value: float, table: np.ndarray, least: float, most: float) -> flo
 
 
 def short(name: str) -> str:
-    """The end of a long name."""
+    """Return the end of a long name."""
     return name if len(name) <= LABEL else f"…{name[1 - LABEL :]}"

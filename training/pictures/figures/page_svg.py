@@ -45,7 +45,7 @@ class PageCanvas(FigureCanvasAgg):
     """Measures text as for a PNG file, and draws for a page."""
 
     def svg(self, label: str, class_: str) -> Markup:
-        """The picture as an svg element; `label` says what it shows, see `style.Inline`."""
+        """Return the picture as an svg element; `label` says what it shows, see `style.Inline`."""
         self.figure.patch.set_visible(False)
         for ax in self.figure.axes:
             ax.patch.set_visible(False)

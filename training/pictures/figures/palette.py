@@ -7,8 +7,8 @@ from matplotlib.colors import to_hex, to_rgb
 
 from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, RGB
 
-# Okabe and Ito's palette: told apart with any colour vision. Line and marker repeat what the colour
-# says, for prints in grey.
+# Okabe and Ito's palette: distinguishable with any colour vision. Line and marker repeat the
+# colour's meaning, for prints in grey.
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 AMBER = "#E69F00"
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, "#6250B5", "#B3263E")  # violet and crimson last
@@ -27,7 +27,7 @@ NAMES = {to_hex(colour): name for name, colour in reversed(DRAWN.items())} | {
 
 
 def themed(colour: Sequence[float]) -> str:
-    """A colour of a picture as the style sheet's variable, if one stands for it."""
+    """Return a colour of a picture as the style sheet's variable, if one stands for it."""
     red, green, blue = colour[:3]
     value = to_hex((red, green, blue))
     return f"var(--{NAMES[value]})" if value in NAMES else value
@@ -51,17 +51,17 @@ def readable(colour: RGB, ground: RGB) -> RGB:
 
 
 def contrast(first: RGB, second: RGB) -> float:
-    """WCAG's contrast of two colours, 1 to 21."""
+    """Return WCAG's contrast of two colours, 1 to 21."""
     low, high = sorted((luminance(first), luminance(second)))
     return (high + 0.05) / (low + 0.05)
 
 
 def luminance(colour: RGB) -> float:
-    """WCAG's relative luminance, 0 to 1."""
+    """Return WCAG's relative luminance, 0 to 1."""
     return float(linear_rgb(colour) @ [0.2126, 0.7152, 0.0722])
 
 
 def linear_rgb(colour: Sequence[float]) -> np.ndarray:
-    """An sRGB colour (3,) as light adds up; both of 0 to 1."""
+    """Return an sRGB colour (3,) as light adds up; both of 0 to 1."""
     c = np.asarray(colour, dtype=float)
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)

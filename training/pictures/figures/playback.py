@@ -53,14 +53,14 @@ class SkeletonMarks:
         self.places = places + place - (1.0 - stride) * way
 
     def root(self, time: float) -> np.ndarray:
-        """(2,) where it is over the ground at a time of the playback [s]."""
+        """Return (2,) where it is over the ground at a time of the playback [s]."""
         return np.asarray(self.places[self._frame(time), 0, :2])
 
     def _frame(self, time: float) -> int:
         return int(np.clip(round((time - self.begins) / self.clip.dt), 0, len(self.clip) - 1))
 
     def marks(self, time: float) -> list[Mark]:
-        """The bones at a time of the playback [s]."""
+        """Return the bones at a time of the playback [s]."""
         joints, colour = self.places[self._frame(time)], to_rgb(ORANGE)
         found = [
             Mark("bone", BAR, joints[parent], joints[i], BONE * self.size, colour)
@@ -74,7 +74,7 @@ class SkeletonMarks:
 def playback_frames(
     robot: Robot, qpos: np.ndarray, dt: float, skeleton: SkeletonMarks | None, size: tuple[int, int]
 ) -> Iterator[np.ndarray]:
-    """Frames (height, width, 3) uint8, 25 a second, of postures (F, nq) `dt` [s] apart.
+    """Yield frames (height, width, 3) uint8, 25 a second, of postures (F, nq) `dt` [s] apart.
 
     Raises PoiseError if nothing can be drawn here.
     """

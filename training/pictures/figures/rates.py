@@ -107,7 +107,7 @@ def forest(out: Out, series: Sequence[Series], title: str, form: str) -> None:
         out: PNG file to write, or a place in a page.
         series: of one value each.
         title: what the values are, below them.
-        form: in which they are told.
+        form: format specification of the printed values.
 
     Raises PoiseError if the file cannot be written.
     """
@@ -140,12 +140,12 @@ def phase_curves(out: Out, series: Sequence[Series]) -> None:
 
 
 def level_text(level: str) -> str:
-    """A level for people: a number with a real minus, a name as it is."""
+    """Return a level for people: a number with a real minus, a name as it is."""
     return f"−{level[1:]}" if level.startswith("-") else level
 
 
 def short(text: str, length: int) -> str:
-    """The beginning of a long text."""
+    """Return the beginning of a long text."""
     return text if len(text) <= length else text[: length - 1] + "…"
 
 

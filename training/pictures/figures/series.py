@@ -13,7 +13,7 @@ from .page_svg import tag
 from .palette import GREY
 from .style import look
 
-BOUNDS = {1.0: "at least ", -1.0: "at most ", 0.0: ""}  # side → how a value is told
+BOUNDS = {1.0: "at least ", -1.0: "at most ", 0.0: ""}  # side → prefix of a printed value
 SIDES = {None: 0.0, "lower": 1.0, "upper": -1.0}  # of a bound: out or in is the true value
 ARROW = 0.11  # length of an arrow over the largest value that is drawn
 
@@ -48,16 +48,16 @@ class Series:
         if self.x.ndim != 1 or any(shape != self.x.shape for shape in shapes):
             raise ValueError(f"x {self.x.shape} and values {shapes} must have one shape (n,)")
 
-    def told(self, k: int, form: str) -> str:
-        """Value number `k` in words, with its interval."""
-        text = f"{self.name}: {BOUNDS[self.side[k]]}{self.y[k]:{form}}"
+    def text(self, k: int, form: str) -> str:
+        """Return value number `k` as text, with its interval."""
+        found = f"{self.name}: {BOUNDS[self.side[k]]}{self.y[k]:{form}}"
         if np.isfinite(self.low[k]) and np.isfinite(self.high[k]):
-            text += f" ({self.low[k]:{form}} to {self.high[k]:{form}})"
-        return text
+            found += f" ({self.low[k]:{form}} to {self.high[k]:{form}})"
+        return found
 
 
 def series(name: str, index: int, rows: Sequence[ArrayLike]) -> Series:
-    """From rows of (x, y, low, high) or (x, y, low, high, side), any number of them."""
+    """Return a series from any number of rows (x, y, low, high) or (x, y, low, high, side)."""
     columns = np.array(rows, dtype=float).reshape(len(rows), -1 if rows else 4).T
     return Series(name, index, *columns)
 
@@ -65,7 +65,7 @@ def series(name: str, index: int, rows: Sequence[ArrayLike]) -> Series:
 def rate_series(
     name: str, index: int, x: Sequence[float], counts: Sequence[tuple[int, int]]
 ) -> Series:
-    """Rates with Wilson intervals from (successes, trials) at each x."""
+    """Return rates with Wilson intervals from (successes, trials) at each x."""
     return series(name, index, [
         (place, won / trials, *wilson_interval(won, trials))
         for place, (won, trials) in zip(x, counts, strict=True)
@@ -83,7 +83,7 @@ def draw_marks(
     ax: Axes, s: Series, tips: str, *, x: np.ndarray | None = None, across: bool = False,
     bars: bool = True, reach: float = 0.0,
 ) -> float:  # fmt: skip
-    """The marks of a series, with the intervals as bars; bounds are hollow, with an arrow.
+    """Return the marks of a series, with the intervals as bars; bounds are hollow, with an arrow.
 
     Args:
         ax: of the picture; a polar one has x as its angle [rad].
@@ -112,7 +112,7 @@ def draw_marks(
             most = max(most, end)
         place = (s.y[k], x[k]) if across else (x[k], s.y[k])
         ax.plot(*place, color=style.colour, marker=style.marker, mfc=fill, zorder=6,
-                gid=tag(s.index, tip=s.told(k, tips)), clip_on=False)  # fmt: skip
+                gid=tag(s.index, tip=s.text(k, tips)), clip_on=False)  # fmt: skip
     if s.side.any():
         ax.plot([], [], color=GREY, ls="", marker="o", mfc="white", label="hollow: only a bound")
     return most

@@ -75,7 +75,7 @@ class Look(NamedTuple):
 
 
 def look(index: int) -> Look:
-    """Look of the series number `index`; the first is the baseline.
+    """Return the look of the series number `index`; the first is the baseline.
 
     Colours repeat after eight, with other markers; after 48 everything repeats.
     """
@@ -109,7 +109,7 @@ Out = str | Path | Inline  # a PNG file, or a part of a page
 
 @contextmanager
 def saved_figure(out: Out, width: float, height: float) -> Iterator[Figure]:
-    """A figure to draw on, [in], saved as a PNG or put into a page when the block ends well.
+    """Yield a figure [in], saved as a PNG or put into a page when the block succeeds.
 
     A file appears complete or not at all, and the same drawing gives the same bytes.
 
@@ -133,13 +133,13 @@ def saved_figure(out: Out, width: float, height: float) -> Iterator[Figure]:
 
 
 def sample(colour: str, line: object = "", marker: Any = "") -> Markup:
-    """How a line with its marks looks, for a legend of a page; its name stands beside it."""
+    """Return how a line with its marks looks, for a legend of a page; its name stands beside it."""
     return _sample(Line2D([1, 15, 29], [6] * 3, color=colour, ls=line, lw=1.9,
                           marker=marker, markevery=[1]))  # fmt: skip
 
 
 def area_sample(**look: Any) -> Markup:
-    """How an area of this look is filled, for a legend of a page."""
+    """Return how an area of this look is filled, for a legend of a page."""
     return _sample(Rectangle((5, 1), 20, 10, **look))
 
 

@@ -78,7 +78,7 @@ def record(
 
 
 def usual(path: str | Path) -> tuple[tuple[int, int], float]:
-    """Size and frames a second of a video that nobody has said these of."""
+    """Return the default size and frame rate of a video."""
     small = Path(path).suffix.lower() == ".webp"
     return (WEBP_SIZE, WEBP_RATE) if small else (SIZE, RATE)
 
@@ -141,7 +141,7 @@ class Episode:
                                       camera=camera)  # fmt: skip
 
     def start(self) -> None:
-        """Begin anew, with its first picture."""
+        """Start over, with the first picture."""
         self.observation, self.info = self.env.reset(**self.reset_kwargs)
         self.total, self.done, self.over, self.seconds = 0.0, False, False, 0.0
         self.draw()
@@ -210,7 +210,7 @@ def _film(
 
 
 def _labelled(name: str, episode: Episode) -> np.ndarray:
-    """The episode's picture with its name, and how it ended."""
+    """Return the episode's picture with its name, and how it ended."""
     from PIL import Image, ImageDraw, ImageFont
 
     picture = Image.fromarray(episode.frame)

@@ -1,1 +1,1 @@
-"""Recorded pushes as one page that plays them: chosen, played again, drawn without a server."""
+"""Recorded pushes as one page that plays them without a server."""

@@ -1,4 +1,4 @@
-"""`poise gallery`: pushes of a result, played again once, as a page that plays them by itself."""
+"""`poise gallery`: pushes of a result, simulated again, as a self-contained page."""
 
 import base64
 import json
@@ -82,7 +82,7 @@ def write_gallery(
             if done.outcome.fall_time is not None:
                 end = f"fell after {done.outcome.fall_time:.1f} s"
             films.append({"end": end, "body": body, **packed(recorder.frames, push)})
-        trials.append({**_told(push), "trial": record.trial, "films": films})
+        trials.append({**_push_fields(push), "trial": record.trial, "films": films})
     page = {"names": names, "colours": _colours(results, names), "shapes": drawn, "rate": RATE,
             "before": BEFORE, "trials": trials}  # fmt: skip
     text = _render(results, page)
@@ -117,12 +117,12 @@ def choose(results: Results, names: Sequence[str], sizes: int) -> list[Record]:
 
 
 def sector(direction: float) -> int:
-    """The middle of the sector of a direction [deg]."""
+    """Return the middle of the sector of a direction [deg]."""
     return round(SECTOR * (round(direction / SECTOR) % (360.0 / SECTOR)))
 
 
 def packed(frames: Sequence[Frame], push: Push) -> dict[str, Any]:
-    """Frames from just before a push on, `RATE` a second, as base64 of little-endian int16.
+    """Return frames from just before a push on, `RATE` a second, as base64 of little-endian int16.
 
     Each frame has all bodies but the world: x, y, z in millimetres, then the quaternion w, x, y, z
     times 32767; `bodies` is how many, `frames` how many frames there are.
@@ -141,7 +141,7 @@ def packed(frames: Sequence[Frame], push: Push) -> dict[str, Any]:
     return {"frames": len(numbers), "bodies": numbers.shape[1], "data": data}
 
 
-def _told(push: Push) -> dict[str, Any]:
+def _push_fields(push: Push) -> dict[str, Any]:
     angle = sector(push.direction)
     return {
         "sector": angle,

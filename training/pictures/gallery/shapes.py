@@ -16,7 +16,7 @@ SPHERE, CAPSULE, CYLINDER, BOX, MESH, ELLIPSOID = (
 
 
 def shapes(robot: Robot) -> list[dict[str, Any]]:
-    """The shapes of a robot, in the axes of their bodies [m], to the millimetre.
+    """Return the shapes of a robot, in the axes of their bodies [m], to the millimetre.
 
     Each has `body`, its number, and either `ends`, two points, with the radius `r`, or `corners`,
     eight points. A mesh is a capsule as long as its bounding box and as thick as its middle edge.
@@ -61,7 +61,7 @@ def _capsule(
 
 
 def _placed(model: mujoco.MjModel, geom: int, point: np.ndarray) -> list[float]:
-    """A point of a geom in the axes of its body."""
+    """Return a point of a geom in the axes of its body."""
     turned = np.zeros(3)
     mujoco.mju_rotVecQuat(turned, point, model.geom_quat[geom])
     return np.round(model.geom_pos[geom] + turned, 3).tolist()

@@ -1,1 +1,1 @@
-"""What a graph, a script and a performed motion look like: one HTML file with pictures."""
+"""Pictures of a graph, a script and a performed motion in one HTML file."""

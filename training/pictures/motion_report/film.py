@@ -21,7 +21,7 @@ class Film(ExitStack):
     Args:
         path: of the .mp4 or .webp file.
         size: width and height [pixels], even.
-        others: is also told of every trial.
+        others: another watch that is also called for every trial.
 
     Attributes:
         frames: how many have been written.

@@ -84,7 +84,7 @@ def write_synthesis(path: Path, record: dict[str, Any], motion: Path, robot: str
 
 
 def graph_pictures(graph: MotionGraph) -> list[Picture]:
-    """The pictures of a graph."""
+    """Return the pictures of a graph."""
     count, size, reasons = len(graph.names), picture_size(graph), {}
     matrix = Inline(f"Adjacency matrix of {count} clips, {len(graph.transitions)} transitions.",
                     size, "plot wide" if count > 9 else "plot")  # fmt: skip

@@ -1,4 +1,4 @@
-"""A script over time: what is played when, what lies over it, and how it is led on."""
+"""Timeline of a script: clips, layers over them, and transitions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -33,9 +33,9 @@ def timeline_picture(record: Mapping[str, Any], trace: Trace | None = None) -> P
     Raises ConfigError for a record that is none.
     """
     try:
-        played = [(str(p["what"]), float(p["begins"]), float(p["ends"]), bool(p["wanted"]),
-                   p["coefficient"] is not None or p.get("physics") is not None,
-                   p.get("physics")) for p in record["played"]]  # fmt: skip
+        parts = [(str(p["what"]), float(p["begins"]), float(p["ends"]), bool(p["wanted"]),
+                  p["coefficient"] is not None or p.get("physics") is not None,
+                  p.get("physics")) for p in record["played"]]  # fmt: skip
         duration = float(record["duration"])
     except (KeyError, TypeError, ValueError, AttributeError):
         raise ConfigError("holds no record of a script", field="played") from None
@@ -47,16 +47,16 @@ def timeline_picture(record: Mapping[str, Any], trace: Trace | None = None) -> P
         caption += (" Below: the tempo of the motion's time, and β, which is 1 where the centre "
                     "of mass is where the motion has it. Shaded is the push.")  # fmt: skip
         key |= {"tempo": sample(*TEMPO), "β": sample(GREEN, "-")}
-    svg = _timeline(played, duration, trace)
+    svg = _timeline(parts, duration, trace)
     return Picture("The script", svg, caption, key)
 
 
-def _timeline(played: Sequence[Part], duration: float, trace: Trace | None) -> Inline:
-    rows = [[] if part[4] else layers_of(part[0]) for part in played]
+def _timeline(parts: Sequence[Part], duration: float, trace: Trace | None) -> Inline:
+    rows = [[] if part[4] else layers_of(part[0]) for part in parts]
     count = max([1, *(len(row) for row in rows)])
     end = max(duration, 0.0 if trace is None else float(trace.motion_time[-1]), 1e-3)
     heights = [ROW * count + 0.3, *([0.9] if trace is not None else [])]
-    out = Inline(f"Timeline of {duration:.1f} s, {len(played)} parts.", WIDTH, "plot wide")
+    out = Inline(f"Timeline of {duration:.1f} s, {len(parts)} parts.", WIDTH, "plot wide")
     with saved_figure(out, WIDTH, sum(heights) + 0.7) as figure:
         axes = figure.subplots(len(heights), sharex=True, squeeze=False,
                                gridspec_kw={"height_ratios": heights})[:, 0]  # fmt: skip
@@ -65,7 +65,7 @@ def _timeline(played: Sequence[Part], duration: float, trace: Trace | None) -> I
         script.set_yticks([k + 0.4 for k in range(count)],
                           ["base", *(f"over {k}" for k in range(1, count))])  # fmt: skip
         script.grid(False)
-        for part, row in zip(played, rows, strict=True):
+        for part, row in zip(parts, rows, strict=True):
             for k, text in enumerate(row):
                 _box(script, part, k, text, end)
             if not row:
@@ -82,7 +82,7 @@ def _timeline(played: Sequence[Part], duration: float, trace: Trace | None) -> I
 
 
 def layers_of(what: str) -> list[str]:
-    """The terms of an overlay, the base first; of anything else the name alone."""
+    """Return the terms of an overlay, the base first; of anything else the name alone."""
     try:
         sequence = parse(what).sequence
     except ConfigError:  # the name of a clip with other characters
@@ -112,13 +112,13 @@ def _box(ax: Axes, part: Part, row: int, text: str, end: float) -> None:
 def _join(ax: Axes, part: Part) -> None:
     """A transition, filled, with its duration above it."""
     kind, begins, ends, _, _, physics = part
-    told = f"{kind}, {ends - begins:.2f} s"
+    tip = f"{kind}, {ends - begins:.2f} s"
     if physics:
-        told += (f", ZMP {100.0 * physics['zmp_inside']:.1f} cm inside, torque "
+        tip += (f", ZMP {100.0 * physics['zmp_inside']:.1f} cm inside, torque "
                  f"{physics['torque']:.0%}{', bent' if physics['bent'] else ''}"
                  f"{', by standing' if physics['through_standing'] else ''}")  # fmt: skip
     colour = AMBER if kind == "physical" else PURPLE
     ax.add_patch(Rectangle((begins, -0.08), ends - begins, 0.96, facecolor=colour, edgecolor=colour,
-                           lw=1.0, gid=tag(tip=told)))  # fmt: skip
+                           lw=1.0, gid=tag(tip=tip)))  # fmt: skip
     middle = 0.5 * (begins + ends)
     ax.text(middle, -0.14, f"{ends - begins:.1f}", ha="center", va="bottom", size=9)

@@ -71,7 +71,7 @@ class Tracer:
         self._rows.append(np.array(now))
 
     def trace(self) -> Trace:
-        """What has been seen."""
+        """Return the trace so far."""
         rows = np.array(self._rows)
         time, motion_time = rows[:, 0], rows[:, 1]
         steps = np.maximum(np.diff(time, prepend=time[0] - 1.0), 1e-9)

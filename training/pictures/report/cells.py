@@ -73,7 +73,7 @@ class Table:
     rows: Sequence[Sequence[Cell]]
 
     def csv(self) -> str:
-        """The numbers as they are, not as they are shown."""
+        """Return the numbers as they are, not as they are shown."""
         header = []
         for column in self.columns:
             name = column.csv or column.key
@@ -94,7 +94,7 @@ class Table:
         return download(f"{self.name}.csv", self.csv())
 
     def without_empty(self) -> Table:
-        """The table less the columns in which no row has a value."""
+        """Return the table less the columns in which no row has a value."""
         count = len(self.columns)
         kept = [k for k in range(count) if any(row[k].value is not None for row in self.rows)]
         rows = [[row[k] for k in kept] for row in self.rows]
@@ -110,7 +110,7 @@ class Download(NamedTuple):
 
 
 def download(name: str, text: str, pack: bool = False) -> Download:
-    """A file as a data URI, packed by gzip (with .gz at its name) if `pack`."""
+    """Return a file as a data URI, packed by gzip (with .gz at its name) if `pack`."""
     content = text.encode()
     kind = "text/csv;charset=utf-8"
     if pack:
@@ -129,7 +129,7 @@ def csv_text(header: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
 
 
 def number_text(value: float, form: str) -> str:
-    """A number for people: with a real minus, and none before a zero."""
+    """Return a number for people: with a real minus, and none before a zero."""
     text = format(value, form)
     return (text if set(text) & set("123456789") else text.lstrip("-")).replace("-", "−")
 
@@ -137,7 +137,7 @@ def number_text(value: float, form: str) -> str:
 def cell(
     value: float | None, form: str = "g", ends: tuple[float, float] | None = None, sign: str = ""
 ) -> Cell:
-    """A number with its interval, written by a format; `sign` before it, as in ≥ 25."""
+    """Return a number with its interval, written by a format; `sign` before it, as in ≥ 25."""
     if value is None:
         return Cell(None, NONE)
     shown = f"{number_text(ends[0], form)} to {number_text(ends[1], form)}" if ends else ""
@@ -145,7 +145,7 @@ def cell(
 
 
 def p_cell(value: float | None) -> Cell:
-    """A p-value; how small it is below 0.001 says nothing to people."""
+    """Return a p-value; how small it is below 0.001 says nothing to people."""
     text = NONE if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
     return Cell(value, text)
 

@@ -39,7 +39,7 @@ TITLES = {
 
 
 def factor_levels(results: Results) -> list[tuple[str, str, Level]]:
-    """(controller, factor, level's entry) of all levels in the summary."""
+    """Return (controller, factor, level's entry) of all levels in the summary."""
     return [
         (name, factor["factor"], level)
         for name, entry in results.summary["controllers"].items()
@@ -49,7 +49,7 @@ def factor_levels(results: Results) -> list[tuple[str, str, Level]]:
 
 
 def factor_plots(results: Results, order: Sequence[str]) -> list[dict[str, str]]:
-    """A title and a picture of every factor, controllers as in `order`."""
+    """Return a title and a picture of every factor, controllers as in `order`."""
     pictures: list[dict[str, str]] = []
     every = factor_levels(results)
     for factor in dict.fromkeys(factor for _, factor, _ in every):
@@ -63,19 +63,19 @@ def factor_plots(results: Results, order: Sequence[str]) -> list[dict[str, str]]
             at = [levels.index(level["level"]) for level in own]
             found.append(rate_series(name, results.controllers.index(name), at, counts))
         title = TITLES.get(factor, factor)
-        told = "; ".join(
+        rates = "; ".join(
             f"{s.name} "
             + ", ".join(f"{levels[int(x)]}: {y:.0%}" for x, y in zip(s.x, s.y, strict=True))
             for s in found
         )
-        out = Inline(f"Recovery rate over {title}: {told}.")
+        out = Inline(f"Recovery rate over {title}: {rates}.")
         level_curves(out, found, levels, standard[0] if standard else None)
         pictures.append({"title": title[:1].upper() + title[1:], "picture": out.svg})
     return pictures
 
 
 def factor_table(results: Results) -> Table | None:
-    """Every level of every factor; None without factors."""
+    """Return every level of every factor; None without factors."""
     caption = "Recovery rate at every level of every factor, lost and won against the standard."
     columns = (CONTROLLER, Text("factor", "factor"), Text("level", "level"), *TRIED, RECOVERED,
                *AGAINST, P_VALUE)  # fmt: skip
@@ -88,7 +88,7 @@ def factor_table(results: Results) -> Table | None:
 
 
 def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
-    """The largest loss of each controller by each factor; None without factors."""
+    """Return the largest loss of each controller by each factor; None without factors."""
     found = factor_levels(results)
     factors = list(dict.fromkeys(factor for _, factor, _ in found))
     texts = [Text(f, f.replace("_", " "), TITLES.get(f, "")) for f in factors]
@@ -110,14 +110,14 @@ def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
 
 
 def _change(level: Level, standard: float) -> Cell:
-    """How much more is recovered at a level than in the standard case [percent points]."""
+    """Return how much more is recovered at a level than in the standard case [percent points]."""
     change = 100.0 * (level["recovered_rate"] - standard)
     shown = cell(change, "+.0f" if abs(change) >= 0.5 else ".0f")
     return shown._replace(ends_text=f"at {level_text(level['level'])}")
 
 
 def indicators(results: Results, order: Sequence[str]) -> Table | None:
-    """EUROBENCH's indicators; None where no standard pushes were played."""
+    """Return EUROBENCH's indicators; None without standard pushes."""
     columns, rows = list(SWAY), []
     for name in order:
         if (found := results.summary["controllers"][name].get("eurobench")) is None:
@@ -158,7 +158,7 @@ def seed_table(results: Results) -> Table | None:
 
 
 def error_table(results: Results) -> Table | None:
-    """Trials in which a controller raised; None without any."""
+    """Return trials in which a controller raised; None without any."""
     caption = "Trials in which a controller raised an error; they count as not recovered."
     rows = [
         {**vars(record), "error": record.error,

@@ -51,15 +51,15 @@ def write_report(
     """Write the report of a finished evaluation or benchmark; returns its path.
 
     The file holds everything it shows: style, script, plots, pictures, and the numbers as CSV. The
-    same folder gives the same file. Trials that cannot be played again are left out, and the report
-    says why.
+    same folder gives the same file. Trials that cannot be simulated again are left out, and the
+    report gives the reason.
 
     Args:
         folder: written by `evaluate`.
         out: the file; `folder`/report.html if not given.
-        films: play the worst trials again, for pictures and plots over time (seconds for each).
+        films: simulate the worst trials again, for pictures and plots over time (seconds for each).
         console: where progress and the path are printed; None: nowhere.
-        allow: controllers from outside (``module:Class``) that may run; others are not played.
+        allow: controllers from outside (``module:Class``) that may run; others are not run.
 
     Raises:
         ConfigError: the folder holds no finished evaluation, or its files are not whole.
@@ -75,7 +75,7 @@ def write_report(
 
 
 def render(results: Results, *, films: bool = True, console: Console | None = None) -> str:
-    """The page; raises ConfigError where the summary does not hold what it should."""
+    """Return the page; raises ConfigError where the summary does not hold what it should."""
     console = console or Console(quiet=True)
     baseline = results.reference
     order = results.summary["ranking"]
@@ -135,18 +135,18 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
 def _cases(
     results: Results, films: bool, console: Console
 ) -> tuple[list[dict[str, object]], list[str]]:
-    """The trials shown, and what to say of those that are not."""
+    """Return the trials shown, and what to say of those that are not."""
     cases = choose_exhibits(results, results.reference, results.summary["ranking"])
     notes: list[str] = []
     if not films:
-        notes.append("The trials were not played again: the report was asked to go without.")
+        notes.append("The trials were not simulated again: films were switched off.")
     problem = can_draw() if films and cases else None
     if problem:
         notes.append(f"There are no pictures: {problem}.")
     done: dict[tuple[int, str], Film | None] = {}
     shown = []
     for k, case in enumerate(cases, 1):
-        played = []
+        found_films: list[Film] = []
         for record in filter(None, (case.record, case.baseline)):
             key = (record.trial, record.controller)
             if films and key not in done:
@@ -156,8 +156,8 @@ def _cases(
                 done[key] = _film(results, record, times, not problem, notes, console)
             found = done.get(key)
             if found is not None:
-                played.append(found)
-        shown.append(_shown(case, played, results))
+                found_films.append(found)
+        shown.append(_shown(case, found_films, results))
     return shown, notes
 
 
@@ -175,7 +175,7 @@ def _film(
         reason = str(error)
     except Exception as error:  # a controller from outside may raise anything
         reason = raised(error)
-    note = f"{record.controller} was not played again: {reason}."
+    note = f"{record.controller} was not simulated again: {reason}."
     if note not in notes:
         notes.append(note)
         console.print(note, markup=False, highlight=False, soft_wrap=True)
@@ -183,16 +183,16 @@ def _film(
 
 
 def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, object]:
-    """A case for the template."""
+    """Return a case for the template."""
     record = case.record
     trial = results.trial(record)
     pushes = [(push.start, push.duration) for push in trial.pushes]
     # the last time worth showing
     end = (record.fall_time if record.fallen else (record.start or 0.0) + 3.0) + AFTER
     parts = []
-    for played in films:
-        who, t = played.record, played.signals.t
-        columns = played.signals.columns
+    for each in films:
+        who, t = each.record, each.signals.t
+        columns = each.signals.columns
         label = (f"Trial {who.trial}, {who.controller}: centre of mass, centre of pressure, "
                  f"capture point, angular momentum and torque over {end:.1f} s.")  # fmt: skip
         name = re.sub(r"[^\w.-]+", "-", f"trial-{who.trial}-{Path(who.controller).name}")
@@ -203,10 +203,10 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
             "name": who.controller,
             "swatch": plots.swatch(results.controllers.index(who.controller)),
             "end": _ending(who),
-            "same": played.same,
+            "same": each.same,
             "frames": [
                 (time, "data:image/webp;base64," + base64.b64encode(picture).decode())
-                for time, picture in played.frames
+                for time, picture in each.frames
             ],
             "plot": picture.svg,
             "download": signals_csv(name, t, columns),
@@ -234,7 +234,7 @@ def _ending(record: Record) -> str:
 
 
 def _facts(results: Results) -> list[tuple[str, str]]:
-    """The origin of the result."""
+    """Return the origin of the result."""
     summary, settings = results.summary, results.settings
     machine, versions = summary["machine"], summary["versions"]
     rows = [
@@ -255,6 +255,6 @@ def _facts(results: Results) -> list[tuple[str, str]]:
 
 
 def _file(results: Results, name: str, most: int) -> Download:
-    """A file of the folder, packed where it is long."""
+    """Return a file of the folder, packed where it is long."""
     text = read_text(results.folder / name, most)
     return download(name, text, pack=len(text) > EMBEDDED)

@@ -6,7 +6,7 @@ from poise.training.pictures.figures.palette import CARDS, variables
 
 
 def render_page(template: str, **values: object) -> str:
-    """The HTML of a template of this room, in which `values` and `colours` are names."""
+    """Return a template of this package as HTML, rendered with `values` and `colours`."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("poise.training.pictures.report", "templates"),
         autoescape=True,

@@ -31,7 +31,7 @@ NONE = (np.nan, np.nan)
 
 
 def swatch(index: int) -> Markup:
-    """How series number `index` looks, for a legend."""
+    """Return how series number `index` looks, for a legend."""
     return sample(*look(index))
 
 
@@ -59,14 +59,14 @@ def forests(results: Results) -> list[Markup]:
         titled = [titled[1], (recovered, "trials that go on as commanded [%]")]
     for found, title in ((j50, J50_MEAN.heading), *titled):
         if found:
-            out = Inline(f"{title}: {'; '.join(s.told(0, '.1f') for s in found)}.")
+            out = Inline(f"{title}: {'; '.join(s.text(0, '.1f') for s in found)}.")
             forest(out, found, title, ".1f")
             pictures.append(out.svg)
     return pictures
 
 
 def envelopes(results: Results) -> tuple[Markup | None, list[tuple[str, Markup]]]:
-    """All envelopes in one picture, and each in one of its own, the best first.
+    """Return all envelopes in one picture, and each in one of its own, the best first.
 
     None and nothing where no suite measured directions.
     """
@@ -87,9 +87,9 @@ def envelopes(results: Results) -> tuple[Markup | None, list[tuple[str, Markup]]
 
 
 def spans(what: str, found: Sequence[Series], form: str) -> str:
-    """What a picture shows, in words: the least and the largest value of each series."""
-    told = [f"{s.name} {np.nanmin(s.y):{form}} to {np.nanmax(s.y):{form}}" for s in found]
-    return f"{what}: {'; '.join(told)}."
+    """Return a description of a plot: the least and the largest value of each series."""
+    ranges = [f"{s.name} {np.nanmin(s.y):{form}} to {np.nanmax(s.y):{form}}" for s in found]
+    return f"{what}: {'; '.join(ranges)}."
 
 
 def limit_keys(results: Results) -> dict[str, Markup]:
@@ -102,7 +102,7 @@ def limit_keys(results: Results) -> dict[str, Markup]:
 
 
 def step_lines(results: Results) -> dict[str, tuple[list[float], list[float]]]:
-    """name → (directions, limit [N·s]) of what steps can stop; nothing where nobody steps.
+    """Return name → (directions, step limit [N·s]); empty if no controller steps.
 
     Those of the first controller that steps.
     """
@@ -130,7 +130,7 @@ def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
 
 
 def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]]]:
-    """The picture of a part, and the bins of each controller.
+    """Return the picture of a part, and the bins of each controller.
 
     Pushes by direction are measured by the ankle limit, as the summary has it.
     """
@@ -154,10 +154,10 @@ def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]
             (part, name, *found, *wilson_interval(*found[1:]), fit.j50, fit.bound, fit.scale)
             for found in trial_bins(*trials[name], BINS)
         ]
-    told = "; ".join(f"{name} {'J50' if fit.bound is None else 'J50, only a bound,'} {fit.j50:.2f}"
+    j50s = "; ".join(f"{name} {'J50' if fit.bound is None else 'J50, only a bound,'} {fit.j50:.2f}"
                      for name, fit in fits.items())  # fmt: skip
     lost = "fallen" if part == WALK_PUSH else "not recovered"
-    out = Inline(f"Fraction of trials {lost}, over the {title}: {told}.")
+    out = Inline(f"Fraction of trials {lost}, over the {title}: {j50s}.")
     fall_probability(out, trials, fits, xlabel=title, lost=lost)
     return out.svg, lines
 

@@ -56,7 +56,7 @@ LOST = (
 
 
 def ranking(results: Results, baseline: str) -> Table | None:
-    """Every controller with what the benchmark measures, the best first."""
+    """Return every controller with what the benchmark measures, the best first."""
     entries, rated = results.summary["controllers"], results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
     second = replace(NOT_FALLEN, ends="")  # there is no room for two intervals
@@ -81,7 +81,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
 
 
 def pairs(results: Results) -> Table | None:
-    """Every pair of controllers on the same trials; None of one alone."""
+    """Return every pair of controllers on the same trials; None of one alone."""
     columns = (*PAIR, *PAIRED, P_VALUE, GAIN)
     return entry_table("pairs", "All pairs on the same trials.", columns, results.summary["pairs"])
 

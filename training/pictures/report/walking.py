@@ -33,12 +33,12 @@ PARTS = {"walk": "walk", "gait": "steps", "velocity": "course", "walk_push": "pu
          "walk_kick": "kicked", "walk_repeated": "pushed again and again",
          "terrains": "terrain"}  # fmt: skip
 WALK = (CONTROLLER, Text("part", "part", "of the suite"),
-        Text("level", "level", "what it is told, or how it is pushed"))  # fmt: skip
+        Text("level", "level", "commanded velocity, or the push"))  # fmt: skip
 MOTION = Text("motion", "motion")
 
 
 def walk_table(results: Results, order: Sequence[str]) -> Table | None:
-    """Every command of every controller: falls, and what was reached; None without walks."""
+    """Return every command of every controller: falls, and what was reached; None without walks."""
     caption = "What was reached of every command, pushed or not: means over trials."
     columns = (*WALK, *FALLS, *STEPS[:2], *FOLLOWED)
     return entry_table("walks", caption, columns, _walks(results, order))
@@ -52,7 +52,7 @@ def cost_table(results: Results, order: Sequence[str]) -> Table | None:
 
 
 def _walks(results: Results, order: Sequence[str]) -> list[Entry]:
-    """An entry for each command."""
+    """Return an entry for each command."""
     return [
         {**each, "part": PARTS.get(each["part"], each["part"]), "level": _words(each["level"])}
         for each in entries_of(results, order, "walks")
@@ -60,7 +60,7 @@ def _walks(results: Results, order: Sequence[str]) -> list[Entry]:
 
 
 def motion_table(results: Results, order: Sequence[str]) -> Table | None:
-    """Every motion and share of every controller; None where no motion was performed."""
+    """Return every motion and share of every controller; None where no motion was performed."""
     caption = "Falls and errors of every motion, by the share of J50 that it was pushed by."
     share = Figure("share", "push", "g", words="of the controller's J50")
     columns = (CONTROLLER, MOTION, share, *FALLS[:2], FELL, *PERFORMED)
@@ -75,7 +75,7 @@ def in_motion_table(results: Results, order: Sequence[str]) -> Table | None:
 
 
 def _motions(results: Results, order: Sequence[str], key: str, every: str) -> list[Entry]:
-    """An entry for each motion; `every` is told of the one that is of all of them."""
+    """Return an entry for each motion; `every` names the entry over all motions."""
     return [
         {**each, "motion": _words(each["motion"] or every)}
         for each in entries_of(results, order, key)
@@ -83,8 +83,8 @@ def _motions(results: Results, order: Sequence[str], key: str, every: str) -> li
 
 
 def level_table(results: Results, order: Sequence[str]) -> Table | None:
-    """Every level of realism of every controller; None where the suite has none."""
-    caption = "The same starts and pushes at each level of realism."
+    """Return all realism levels of all controllers; None if the suite has none."""
+    caption = "The same initial states and pushes at each realism level."
     columns = (CONTROLLER, Text("level", "level", "of realism"), *AT_LEVEL)
     rows = [{**e, "level": _words(e["level"])} for e in entries_of(results, order, "levels")]
     return entry_table("levels", caption, columns, rows)

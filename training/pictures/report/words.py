@@ -17,7 +17,7 @@ from .cells import number_text
 
 
 def lead(results: Results) -> list[str]:
-    """The result in a sentence or three."""
+    """Return the result in a sentence or three."""
     summary = results.summary
     fair = [name for name in summary["ranking"] if not assisted(summary["controllers"][name])]
     first = (fair or summary["ranking"])[0]
@@ -54,7 +54,7 @@ def lead(results: Results) -> list[str]:
 
 
 def _not_separated(summary: Summary, first: str, second: str) -> str:
-    """How far the trials tell the first two apart; empty where they do.
+    """Return how far the trials tell the first two apart; empty where they do.
 
     By the interval of the gain in J50 where controllers are ranked by that, else by McNemar's test.
     """
@@ -71,7 +71,7 @@ def _not_separated(summary: Summary, first: str, second: str) -> str:
 
 
 def push_text(record: Record, trial: Trial) -> str:
-    """The first push in words, and in what the trial differs from the standard one."""
+    """Return the first push in words, and in what the trial differs from the standard one."""
     if not math.isfinite(record.impulse):
         return "No push."
     details = f", {record.fraction:.2f} of the limit" if math.isfinite(record.fraction) else ""

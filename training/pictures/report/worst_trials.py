@@ -1,4 +1,4 @@
-"""The trials that a report shows are chosen and played again: frames and signals."""
+"""Choose the trials that a report shows and simulate them again: frames and signals."""
 
 import io
 import math
@@ -47,7 +47,7 @@ class Exhibit:
 
 @dataclass(frozen=True)
 class Film:
-    """A trial played again.
+    """A trial simulated again.
 
     Attributes:
         record: as recorded.
@@ -164,7 +164,7 @@ class _FrameTaker:
 
 
 def signals_csv(name: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> Download:
-    """All signals as CSV, to a hundredth of what the plot shows."""
+    """Return all signals as CSV, to a hundredth of what the plot shows."""
     header, blocks = ["t"], [t[:, None]]
     for key, titles in POINTS.items():
         header += titles
@@ -176,7 +176,7 @@ def signals_csv(name: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> 
 
 
 def compressed(frame: np.ndarray) -> bytes:
-    """A frame (h, w, 3) as WebP."""
+    """Return a frame (h, w, 3) as WebP."""
     from PIL import Image
 
     buffer = io.BytesIO()

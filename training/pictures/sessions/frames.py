@@ -91,12 +91,12 @@ class Observer:
         self._surfaces = LEVEL
 
     def __call__(self, fall_time: float | None = None) -> Frame:
-        """The frame of this moment, of a robot that fell at `fall_time` [s]."""
+        """Return the frame of this moment, of a robot that fell at `fall_time` [s]."""
         simulation = self._env.simulation
         if self._forces.simulation is not simulation:  # other conditions, another simulation
             self._forces = ContactForces(simulation)
         data, arrays = simulation.data, simulation.arrays
-        if not np.array_equal(self._surfaces, arrays.surfaces):  # an episode may draw them anew
+        if not np.array_equal(self._surfaces, arrays.surfaces):  # an episode may resample them
             self._surfaces = arrays.surfaces.copy()
         return Frame(
             time=simulation.time,
@@ -112,7 +112,7 @@ class Observer:
         )
 
     def _reference(self, time: float) -> Poses | None:
-        """The ghost's bodies at a time [s]; it stands anew where the robot has been reset."""
+        """Return the ghost's bodies at a time [s]; after a reset it stands where the robot does."""
         if time == 0.0:
             robot, seen = self._env.robot, self._seen
             self._ghost = ghost_of(self._env) if seen is None else Seen(seen, robot)
@@ -131,7 +131,7 @@ class Observer:
 
 
 def ground_at(point: np.ndarray, surfaces: np.ndarray, floor: float) -> np.ndarray:
-    """(3,) the ground at the x and y of `point` [m]; surfaces and floor as of a `Frame`."""
+    """Return (3,) the ground at the x and y of `point` [m]; surfaces and floor as of a `Frame`."""
     x, y = float(point[0]), float(point[1])
     return np.array([x, y, height_at([Surface(*row) for row in surfaces.tolist()], floor, x, y)])
 

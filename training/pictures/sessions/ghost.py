@@ -37,7 +37,7 @@ class Ghost:
         return Poses(*self._bodies.poses(time, self._soles(time)))
 
     def posture(self, time: float) -> np.ndarray:
-        """(nq,) its posture at a time [s] of the motion."""
+        """Return (nq,) its posture at a time [s] of the motion."""
         self._bodies.at(time, self._soles(time))
         return self._bodies.posture
 
@@ -59,14 +59,14 @@ class Seen:
         self._clip, self._robot, self._data = clip, robot, mujoco.MjData(robot.model)
 
     def __call__(self, time: float) -> Poses:
-        """Where they are at a time [s]; they begin anew after the last frame."""
+        """Return their poses at a time [s]; the motion repeats after the last frame."""
         self._data.qpos[:] = self._clip.qpos[round(time / self._clip.dt) % len(self._clip.qpos)]
         mujoco.mj_kinematics(self._robot.model, self._data)
         return Poses(self._data.xpos.copy(), self._data.xquat.copy())
 
 
 def ghost_of(env: BalanceEnv) -> Ghost | None:
-    """The ghost of the motion in an environment that has just been reset.
+    """Return the ghost of the motion in an environment that has just been reset.
 
     None where there is no motion, or it only stands.
     """

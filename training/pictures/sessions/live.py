@@ -1,4 +1,4 @@
-"""What is played: a session that runs, or a trial that was recorded; both with their frames."""
+"""Sources of frames: a running session or a recorded trial."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -66,12 +66,12 @@ class Live:
 
     @property
     def gait(self) -> GaitCommand | None:
-        """What those that walk are told now; None where nothing walks."""
+        """The current command of the walking controllers; None if no controller walks."""
         return self.session.command if self.session.walks else None
 
     @property
     def reach(self) -> Reach | None:
-        """What all those that walk can be told; None where one of them does not say."""
+        """The command range that all walking controllers share; None if one of them states none."""
         return self.session.reach
 
     @property
@@ -85,7 +85,7 @@ class Live:
         self._observe()
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.session.reset()
         self._begin()
 
@@ -94,7 +94,7 @@ class Live:
         return self.session.push(**fields)
 
     def walk(self, **fields: object) -> TimedCommand:
-        """Tell those that walk a command; see `Session.walk`."""
+        """Command those that walk; see `Session.walk`."""
         return self.session.walk(**fields)
 
     def film(self, name: str, path: Path) -> None:
@@ -106,9 +106,9 @@ class Live:
 
         time = self.session.time
         if time == 0.0:
-            raise PoiseError("nothing has been played that a video could show")
+            raise PoiseError("nothing has been simulated that a video could show")
         if time > LONGEST_FILM:
-            raise PoiseError(f"a video is of at most {LONGEST_FILM:g} s, begin anew by Reset")
+            raise PoiseError(f"a video is of at most {LONGEST_FILM:g} s, start over with Reset")
         agent = load_player(name, self.robot, self._motion, time, self.spec.realism)
         trial = self.session.sides[self.names.index(name)].own(self.session.trial)
         if agent.begin is not None:
@@ -168,7 +168,7 @@ Play = Live | Recorded  # something with a timeline
 
 
 def _push_text(push: Push) -> str:
-    """A push as `--push` takes it, without what has its default."""
+    """Return a push as `--push` takes it, without what has its default."""
     x, y, z = push.point
     return _mapping(
         impulse=push.impulse,
@@ -183,11 +183,11 @@ def _push_text(push: Push) -> str:
 
 
 def _command_text(command: TimedCommand) -> str:
-    """A command as `--command` takes it, without what has its default."""
+    """Return a command as `--command` takes it, without what has its default."""
     return _mapping(**{name: value or None for name, value in asdict(command).items()})
 
 
 def _mapping(**fields: object) -> str:
-    """A YAML mapping on one line, of what is not None."""
+    """Return a YAML mapping on one line, of what is not None."""
     given = {name: value for name, value in fields.items() if value is not None}
     return "{" + ", ".join(f"{name}: {value}" for name, value in given.items()) + "}"

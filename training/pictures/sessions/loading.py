@@ -1,4 +1,4 @@
-"""From what is asked for in text to a session that can be played."""
+"""Build a session from its settings in text."""
 
 import re
 from collections.abc import Callable
@@ -24,7 +24,7 @@ SHORT = re.compile(r"(?P<impulse>[^@{]+)@(?P<direction>[^@]+)(?:@(?P<start>[^@]+
 
 
 def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: None) -> Live:
-    """The session that `spec` asks for, at its start.
+    """Return the session that `spec` asks for, at its start.
 
     Raises ConfigError for what is not valid; nothing that takes long has been done then, unless it
     is a controller itself. `say` is given a line before the controllers are loaded.
@@ -50,7 +50,7 @@ def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: Non
 
 
 def read_pushes(text: str, robot: Robot) -> list[Push]:
-    """The pushes of a flag `--push`; raises ConfigError for what is none.
+    """Return the pushes of a flag `--push`; raises ConfigError for what is none.
 
     That is impulse [N·s] @ direction [deg] and, if not at 1 s, @ start [s], of the robot's first
     push body, such as 20@90@1.5; or a YAML mapping with the fields of a push.

@@ -11,8 +11,8 @@ from poise.envs.viewing.quantities import PUSH
 
 from .frames import Frame
 
-DURATION = 0.1  # of a push that nobody has chosen another for [s]
-WEIGHT = 0.5  # of a push that nobody has chosen another for: J/m [m/s]
+DURATION = 0.1  # of a push, by default [s]
+WEIGHT = 0.5  # of a push, by default: J/m [m/s]
 GAIN = 1.0  # [m/s] of J/m for an arrow as long as the CoM is high
 LONGEST = 2.0  # arrow over CoM height
 FLAT = 0.1  # a ray that goes down less steeply than this does not point at a place
@@ -34,7 +34,7 @@ class Pull(NamedTuple):
     arrow: np.ndarray
 
     def mark(self, robot: Robot) -> Mark:
-        """The arrow that begins where the body was grabbed."""
+        """Return the arrow that begins where the body was grabbed."""
         return Mark("push", ARROW, self.start, self.start + self.arrow, 0.03 * robot.height_com,
                     PUSH.colour, 0.8)  # fmt: skip
 
@@ -55,7 +55,7 @@ class Pull(NamedTuple):
 def pull(
     robot: Robot, frame: Frame, body: int, grabbed: np.ndarray, ray: tuple[np.ndarray, np.ndarray]
 ) -> Pull:
-    """The pull of a body that was grabbed at a point (3,), world axes, towards the mouse.
+    """Return the pull of a body that was grabbed at a point (3,), world axes, towards the mouse.
 
     `ray` is where the camera is (3,) and a point (3,) under the mouse, at any distance. The arrow
     ends where the ray meets the horizontal plane through the grabbed point.
@@ -73,7 +73,7 @@ def pull(
 def grabbed_point(
     robot: Robot, body: int, position: np.ndarray, rotation: np.ndarray, grabbed: np.ndarray
 ) -> np.ndarray:
-    """A place (3,), world axes, from a body's centre of mass and in the body's axes [m].
+    """Return a place (3,), world axes, from a body's centre of mass and in the body's axes [m].
 
     `position` (3,) and `rotation` (3, 3) are the body's.
     """

@@ -9,7 +9,7 @@ WINDOW = 2.0  # [s] over which the factor of this moment is taken
 
 
 class Pace:
-    """Says how many steps are due, and how near to real time they are played.
+    """Compute how many steps are due, and how close to real time they run.
 
     Args:
         clock: seconds of the wall clock.
@@ -18,20 +18,20 @@ class Pace:
     def __init__(self, clock: Callable[[], float] = time.monotonic):
         self._clock, self._last = clock, clock()
         self.speed = 1.0  #: simulated over wall-clock seconds that is wanted
-        self.wanted = self.played = 0.0  #: [s] that speed and clock asked for; that were played
+        self.wanted = self.stepped = 0.0  #: [s] due by speed and clock; simulated
         self._owed, self._period = 0.0, 1.0
         self._recent: deque[tuple[float, float]] = deque()
 
     def due(self, period: float) -> int:
-        """The number of steps of `period` [s] to play now; they count as played."""
+        """Return the number of steps of `period` [s] to run now; they count as run."""
         self._period = period
         elapsed = self._elapsed() * self.speed
         self.wanted += elapsed
         self._owed = min(self._owed + elapsed, max(BACKLOG, period))
         count = int(self._owed / period + 1e-9)
         self._owed -= count * period
-        self.played += count * period
-        self._recent.append((self.wanted, self.played))
+        self.stepped += count * period
+        self._recent.append((self.wanted, self.stepped))
         while self.wanted - self._recent[0][0] > WINDOW * self.speed:
             self._recent.popleft()
         return count
@@ -47,12 +47,12 @@ class Pace:
         return min(self._owed / self._period, 1.0)
 
     def until_due(self, period: float) -> float:
-        """Wall-clock seconds until the next step is due."""
+        """Return the wall-clock time [s] until the next step is due."""
         return max((period - self._owed) / self.speed, 0.0)
 
     @property
     def factor(self) -> float:
-        """Played over wanted time of the last seconds: 1 is real time, at the chosen speed."""
+        """Simulated over due time in the last seconds: 1 is real time, at the chosen speed."""
         if len(self._recent) < 2:
             return 1.0
         (first, before), (last, now) = self._recent[0], self._recent[-1]
@@ -61,7 +61,7 @@ class Pace:
     @property
     def total(self) -> float:
         """The same over all the time that counted."""
-        return self.played / self.wanted if self.wanted > 0.0 else 1.0
+        return self.stepped / self.wanted if self.wanted > 0.0 else 1.0
 
     def _elapsed(self) -> float:
         now = self._clock()

@@ -1,4 +1,4 @@
-"""A trial of a result, played again as `poise replay` does, as frames to scrub through."""
+"""A trial of a result, simulated again as `poise replay` does, as frames to scrub through."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -49,7 +49,7 @@ class Recorder:
 def recorded_trial(
     folder: Path, trial: int, controllers: Sequence[str] = (), allow: str | Iterable[str] = ()
 ) -> tuple[Recorded, list[str]]:
-    """A trial by up to three of the controllers that took part, side by side.
+    """Return a trial by up to three of the controllers that took part, side by side.
 
     A trial that a robot fell in is over for it; it goes to the ground, and stays as it lies there.
 
@@ -69,7 +69,7 @@ def recorded_trial(
         raise ConfigError(f"at most {MOST} stand side by side", field="controllers")
     results = load_results(folder)
     names = list(controllers) or [results.controllers[-1]]
-    for name in names:  # before the first is played
+    for name in names:  # before the first is simulated
         results.record(name, trial)
     recorders, lines = [Recorder() for _ in names], []
     reasons: dict[str, str] = {}

@@ -36,12 +36,12 @@ class Side:
         self.begin(trial)
 
     def begin(self, trial: Trial) -> None:
-        """Start the trial anew."""
+        """Restart the trial."""
         self.fall_time: float | None = None  #: [s] after the reset
         self._stepped = SteppedTrial(self.agent, self.own(trial))
 
     def own(self, trial: Trial) -> Trial:
-        """What of a trial is for this controller: one that only stands is told no velocity."""
+        """Return the trial for this controller: one that only stands gets no velocity command."""
         return trial if self.walker is not None else replace(trial, commands=())
 
     @property
@@ -107,7 +107,7 @@ class Session:
         return self.sides[0].time
 
     def reset(self) -> None:
-        """Begin anew, without the pushes and commands that came while it ran."""
+        """Start over, without the pushes and commands that were added while it ran."""
         self.pushes, self.commands = self._known
         for side in self.sides:
             side.begin(self.trial)
@@ -137,7 +137,7 @@ class Session:
 
     @property
     def reach(self) -> Reach | None:
-        """What all that walk can be told; None where one of them does not say, or none walks."""
+        """The command range shared by all that walk; None if one states none, or none walks."""
         return shared_reach([each.walker.reach for each in self.sides if each.walker is not None])
 
     @property
@@ -159,15 +159,15 @@ class Session:
             PoiseError: there have been as many commands as an episode may have.
         """
         (command,) = parse_commands({**fields, "start": self.time}, "command")
-        walkers, told = self._expect_walkers(), command_of(command.array())
-        for walker in walkers:  # before one of them is told
-            walker.check_command(told)
+        walkers, commanded = self._expect_walkers(), command_of(command.array())
+        for walker in walkers:  # before one of them is commanded
+            walker.check_command(commanded)
         before = tuple(each for each in self.commands if each.start < self.time - SOON)
         if len(before) == MOST_COMMANDS:
-            raise PoiseError(f"at most {MOST_COMMANDS} commands: begin anew by Reset")
+            raise PoiseError(f"at most {MOST_COMMANDS} commands: start over with Reset")
         self.commands = (*before, command)
         for walker in walkers:
-            walker.command = told
+            walker.command = commanded
         return command
 
     def _expect_walkers(self) -> list[CommandedEnv]:
@@ -188,7 +188,7 @@ def load_session(
     motion: ReferenceMotion | None = None,
     realism: str = IDEAL,
 ) -> Session:
-    """A session of these controllers in the standard conditions of an evaluation.
+    """Return a session of these controllers in the standard conditions of an evaluation.
 
     With a motion all perform it; to be lower than it ever is is a fall, or further from upright.
 
@@ -206,7 +206,7 @@ def load_player(
     duration: float,
     realism: str = IDEAL,
 ) -> Agent:
-    """A controller of a session that lasts `duration` [s]; errors as of `load_session`."""
+    """Return a controller of a session that lasts `duration` [s]; errors as of `load_session`."""
     if motion is None:
         level = load_realism(realism)
         return load_agent(name, robot, duration=duration, pushes=None, realism=level)

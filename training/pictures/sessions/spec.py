@@ -16,7 +16,7 @@ from poise.training.benchmarking.trials.names import NO_CONTROL
 
 STANDING = "standing"  # the motion of a session that names none
 MOST = 3  # controllers side by side
-NOBODY = "none"  # in the place of a controller
+NO_CONTROLLER = "none"
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def read_link(query: str, now: Spec, names: Collection[str]) -> Spec | None:
 
 
 def _number(text: str, field: str) -> int:
-    """A whole number of at most nine digits."""
+    """Return a whole number of at most nine digits."""
     if not (text.isascii() and text.isdigit() and len(text) < 10):
         raise ConfigError(f"must be a whole number, not {shown(text)}", field=field)
     return int(text)

@@ -1,4 +1,4 @@
-"""One walk: played, told in lines while it goes on, filmed, and its figures in words."""
+"""One walk: simulated with printed progress, filmed, and its figures in words."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -58,7 +58,7 @@ def walk(
         controller: one that walks, as `load_agent` takes it.
         robot: a packaged robot or a path to its description.
         terrain: a kind of terrain, or a mapping with its `kind`, see `make_terrain`.
-        realism: a packaged level of realism or a path to one; None: ideal.
+        realism: a packaged realism level or a path to one; None: ideal.
         physics: a packaged engine or a path to its settings; None: MuJoCo.
         push: impulse [N·s] and direction [deg], such as "20@90", of a push of 0.1 s; None: none.
         push_at: the start of the push [s].
@@ -89,10 +89,10 @@ def walk(
     )  # fmt: skip
     check_walks(controller, agent, "walk")
     trial = Trial(0, seed, pushes, commands=commands)
-    told = commands[0]
-    say(f"{controller}, {loaded.name}: {told.ahead:g} m/s ahead, {told.left:g} left, "
-        f"{np.degrees(told.turn):g} °/s for {duration:g} s")  # fmt: skip
-    outcome = run_trial(agent, trial, Told(say))
+    first = commands[0]
+    say(f"{controller}, {loaded.name}: {first.ahead:g} m/s ahead, {first.left:g} left, "
+        f"{np.degrees(first.turn):g} °/s for {duration:g} s")  # fmt: skip
+    outcome = run_trial(agent, trial, WalkProgress(say))
     for line in lines(outcome, trial, agent):
         say(line)
     if video is not None:
@@ -136,8 +136,8 @@ def parse_push(text: str, start: float, duration: float, robot: Robot) -> Push:
     return read_pushes(f"{text}@{start}", robot)[0]
 
 
-class Told:
-    """Tells every few seconds how far a walk is; hand it to `run_trial`."""
+class WalkProgress:
+    """Print time and speed of a walk every few seconds; pass it to `run_trial`."""
 
     def __init__(self, say: Say):
         self._say, self._due = say, EVERY
@@ -156,7 +156,7 @@ class Told:
 
 
 def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
-    """The figures of a walk in words."""
+    """Yield the figures of a walk in words."""
     o, end = outcome, agent.env.simulation.time
     yield f"fell after {o.fall_time:.1f} s" if o.fallen else f"upright after {end:.0f} s"
     if not o.fallen and o.surfaces_passed is None:
@@ -185,7 +185,7 @@ def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
 
 
 def said_of_end(outcome: Outcome, trial: Trial) -> str:
-    """Whether a robot that has not fallen does in the end as it is told."""
+    """Return whether a robot that has not fallen follows its command at the end."""
     held = "" if outcome.recovered else "not "
     if trial.command is None or not trial.command.array()[:3].any():
         return f"it is {held}at rest"

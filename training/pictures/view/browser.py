@@ -30,7 +30,7 @@ Job = Callable[[], None]
 
 
 class BrowserView:
-    """Plays in a page until it is told to end.
+    """Run a session in a page until it is ended.
 
     Everything that is simulated happens in `run`, in the thread that calls it: what the page's
     threads want is put into a queue and done between two steps.
@@ -47,7 +47,7 @@ class BrowserView:
         self.pace, self.paused = Pace(), False
         self._opacity, self._hidden, self._following = OPACITY, set[Quantity](), True
         self._sliders = Throttle(COMMAND)  # what they ask for
-        self._drawn = self._told = -1e9  # when the last picture and status were shown [s]
+        self._drawn = self._shown = -1e9  # when the last picture and status were shown [s]
         self._set_dark(dark)
         wishes = Wishes(
             pause=self.toggle, step=self.step, reset=self.reset, speed=self.set_speed,
@@ -108,7 +108,7 @@ class BrowserView:
         self._changed()
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self._sliders.waiting = None
         self.play.reset()
         self._changed()
@@ -186,13 +186,13 @@ class BrowserView:
             self.play.step()
 
     def _give_command(self) -> None:
-        """Have those that walk told what the sliders ask for, if the last command is old enough."""
+        """Command the sliders' velocity, if the last command is old enough."""
         fields = self._sliders.take(self.play.history[-1][0].time)
         if fields is not None:
             self.play.walk(**fields)
 
     def _attempt(self, job: Job) -> None:
-        """Do something; what it raises is told, and no end of the page."""
+        """Run a job; show the error that it raises, and keep the page running."""
         try:
             job()
         except PoiseError as error:
@@ -206,8 +206,8 @@ class BrowserView:
         self.stage.show(self._frames())
         if self._floor.position[2] != self.stage.floor:
             self._floor.position = (0.0, 0.0, self.stage.floor)
-        if now - self._told >= TELL:
-            self._told = now
+        if now - self._shown >= TELL:
+            self._shown = now
             history = self.play.history
             at, first, last = (history[k][0].time for k in (self.play.at, 0, -1))
             pulled = None if self.stage.pull is None else self._push_of(self.stage.pull)
@@ -218,7 +218,7 @@ class BrowserView:
             self.plots.show(history, self.play.at, self.play.period)
 
     def _frames(self) -> Frames:
-        """What is shown now: in slow motion a place on the way to the last step's end."""
+        """Return what is shown now: in slow motion interpolated towards the last step's end."""
         history, at = self.play.history, self.play.at
         if self.paused or self.pace.speed >= 1.0 or at == 0:
             return history[at]
@@ -226,8 +226,8 @@ class BrowserView:
         return tuple(between(first, second, self.pace.phase) for first, second in pairs)
 
     def _changed(self) -> None:
-        """Have the next picture show everything anew."""
-        self._drawn = self._told = -1e9
+        """Redraw everything in the next picture."""
+        self._drawn = self._shown = -1e9
 
     def _wait(self, end: float) -> None:
         """Do what is asked; or wait for it until the next step or picture is due."""
@@ -249,7 +249,7 @@ class BrowserView:
             self.push(self._push_of(pulled))
 
     def _push_of(self, pulled: Pull) -> dict[str, object]:
-        """The push that the arrow of the mouse is."""
+        """Return the push that the arrow of the mouse is."""
         return pulled.fields(self.play.robot, self.play.yaw, float(self.panel.duration.value))
 
     def show(self, quantity: Quantity, shown: bool) -> None:

@@ -23,8 +23,8 @@ Placed = tuple[np.ndarray, np.ndarray, np.ndarray, Mark]  # start, end, scale, m
 class MarkSet:
     """All marks of one shape: instances of one mesh, as many as there is room for.
 
-    Those that are not used have no size: to change their number, or how opaque they are, makes the
-    browser build all of them anew. So a mark that fades grows thin.
+    Unused marks have no size: the browser rebuilds all of them when their number or opacity
+    changes. So a mark that fades becomes thinner.
     """
 
     def __init__(self, scene: viser.SceneApi, name: str, mesh: trimesh.Trimesh, room: int):
@@ -106,7 +106,7 @@ def linear(colour: tuple[float, ...]) -> np.ndarray:
 
 
 def _along(vector: np.ndarray) -> np.ndarray:
-    """A quaternion (4,), w first, that turns the z axis towards `vector` (3,)."""
+    """Return a quaternion (4,), w first, that turns the z axis towards `vector` (3,)."""
     quaternion = NO_TURN.astype(float)
     if vector.any():
         mujoco.mju_quatZ2Vec(quaternion, vector)

@@ -75,14 +75,14 @@ class NativeView:
         self._pull = found
 
     def _push(self, fields: dict[str, object]) -> None:
-        """Push the robot; a push that cannot be is told, and no end of the window."""
+        """Push the robot; print the error of an invalid push, and keep the window open."""
         try:
             self.live.push(**fields)
         except PoiseError as error:
             print(error)
 
     def _pulled(self, viewer: Viewer) -> Pull | None:
-        """The body that MuJoCo's window drags, if it is one of the robot's."""
+        """Return the body that MuJoCo's window drags, if it is one of the robot's."""
         perturb, data = viewer.handle.perturb, self.live.session.sides[0].env.data
         body = int(perturb.select)
         if not perturb.active & int(mujoco.mjtPertBit.mjPERT_TRANSLATE) or body < 1:

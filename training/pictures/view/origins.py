@@ -19,7 +19,7 @@ Answer = Callable[["ServerConnection", "Request"], "Response | None"]
 
 
 def own_page(origin: str | None, host: str | None, loopback: bool) -> bool:
-    """Whether a request comes from a page of the server that it asks.
+    """Return whether a request comes from a page of the server that it asks.
 
     A browser names the page in `origin` and the server in `host`; a program that is no browser
     names no page. At a loopback address the server has a name of this machine alone: another one
@@ -31,7 +31,7 @@ def own_page(origin: str | None, host: str | None, loopback: bool) -> bool:
 
 
 class Visits:
-    """Who is told of a page that is opened: `opened(query)` of its address, in any thread.
+    """Called for a page that is opened: `opened(query)` with its address, in any thread.
 
     What it raises as PoiseError is the answer instead of the page.
     """
@@ -43,7 +43,7 @@ class Visits:
         """Tell of a request if it opens the page, not one of its files; what is wrong with it."""
         path, headers = urlsplit(request.path), request.headers
         page = path.path in ("/", "/index.html") and "Upgrade" not in headers
-        # a picture in somebody else's page is none that a user has opened
+        # a frame embedded in another site's page was not opened by the user
         if not page or headers.get("Sec-Fetch-Dest", "document") != "document":
             return None
         try:
@@ -55,9 +55,9 @@ class Visits:
 
 @contextlib.contextmanager
 def own_pages_only(loopback: bool, visits: Visits) -> Iterator[None]:
-    """Have servers that are started meanwhile refuse what is not of their own pages, by 403.
+    """Make servers started in the block answer 403 to requests from other pages.
 
-    `visits` is told of pages that are opened; what it refuses is answered by 404.
+    `visits` is called for pages that are opened; one that it refuses is answered by 404.
 
     viser has no such setting: it calls `websockets.asyncio.server.serve`, which is wrapped here for
     as long as a server starts.

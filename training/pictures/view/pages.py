@@ -1,4 +1,4 @@
-"""The open pages: what they are told and sent as files, and where their cameras are."""
+"""The open pages: messages and files sent to them, and their cameras."""
 
 import io
 import tempfile
@@ -16,7 +16,7 @@ from poise.training.pictures.sessions.live import Play
 
 from .stage import PHONE, Stage
 
-CLOSE = 6.0  # [s] after which what is told goes away
+CLOSE = 6.0  # [s] after which a message disappears
 #: [s] for a browser to draw a picture: in software seconds, on a busy machine a minute
 TIMEOUT = 180.0
 Colour = Literal["red"] | None
@@ -32,7 +32,7 @@ class Pages:
     def __init__(self, server: viser.ViserServer, stage: Callable[[], Stage]):
         self._server, self._stage = server, stage
         self._phones: dict[int, bool] = {}  # page → whether its controls are below
-        self._last: tuple[float, str, Colour] = (-np.inf, "", None)  # that was told: when, what
+        self._last: tuple[float, str, Colour] = (-np.inf, "", None)  # last message: when, what
         server.on_client_connect(self._connected)
 
     def say(self, text: str, colour: Colour = None) -> None:
@@ -49,8 +49,8 @@ class Pages:
     def _connected(self, client: viser.ClientHandle) -> None:
         self._phones[client.client_id] = phone = client.camera.image_width < PHONE
         form, eye = client.camera.aspect, self._stage().point_camera(client, phone)
-        told, text, colour = self._last
-        if time.monotonic() - told < CLOSE:
+        said, text, colour = self._last
+        if time.monotonic() - said < CLOSE:
             _notify(client, text, colour)
 
         @client.camera.on_update
@@ -76,7 +76,7 @@ def send_picture(server: viser.ViserServer, client: int, background: tuple[int, 
 
 
 def png(drawn: np.ndarray, background: tuple[int, int, int]) -> bytes:
-    """A picture (h, w, 4) uint8 on a background, as the bytes of a file."""
+    """Return a picture (h, w, 4) uint8 on a background, as the bytes of a file."""
     picture = Image.fromarray(np.ascontiguousarray(drawn), "RGBA")
     whole = Image.new("RGBA", picture.size, (*background, 255))
     whole.alpha_composite(picture)
@@ -92,7 +92,7 @@ def send_films(server: viser.ViserServer, client: int, play: Play) -> None:
     """
     viewer = server.get_clients().get(client)
     if viewer is None:
-        raise PoiseError("nobody looks on any more")
+        raise PoiseError("the page is no longer open")
     with tempfile.TemporaryDirectory(prefix="poise-view-") as folder:
         for k, name in enumerate(play.names):
             path = Path(folder) / "poise.mp4"

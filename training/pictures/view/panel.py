@@ -15,7 +15,7 @@ from poise.envs.viewing.quantities import QUANTITIES, Quantity
 from poise.training.pictures.sessions.live import Play
 from poise.training.pictures.sessions.mouse import DURATION, WEIGHT
 from poise.training.pictures.sessions.pace import Pace
-from poise.training.pictures.sessions.spec import MOST, NOBODY, Choices, Spec, TrialSpec
+from poise.training.pictures.sessions.spec import MOST, NO_CONTROLLER, Choices, Spec, TrialSpec
 
 from .walking import WalkSliders
 
@@ -96,7 +96,7 @@ class Panel:
             self._saving()
 
     def set_up(self, play: Play) -> None:
-        """Offer what this robot has, and what is played."""
+        """Set the choices of this robot and of the running session."""
         bodies, spec = body_names(play.robot), play.spec
         self.body.options = bodies
         self.body.value = "torso" if "torso" in bodies else bodies[0]
@@ -109,8 +109,8 @@ class Panel:
             if name in choice.options:
                 choice.value = name
         for k, choice in enumerate(self.controllers):
-            name = spec.controllers[k] if k < len(spec.controllers) else NOBODY
-            choice.value = name if name in choice.options else NOBODY
+            name = spec.controllers[k] if k < len(spec.controllers) else NO_CONTROLLER
+            choice.value = name if name in choice.options else NO_CONTROLLER
 
     def tell_how(self, spec: Spec, gait: GaitCommand | None) -> None:
         """Bring the command line, the link and, with a `gait`, its sliders up to date."""
@@ -176,7 +176,7 @@ class Panel:
         self.robot: Any = gui.add_dropdown("Robot", self.choices.robots)
         names = self.choices.controllers
         self.controllers: list[Any] = [
-            gui.add_dropdown(f"Controller {k + 1}", names if k == 0 else (NOBODY, *names))
+            gui.add_dropdown(f"Controller {k + 1}", names if k == 0 else (NO_CONTROLLER, *names))
             for k in range(MOST)
         ]
         self.motion: Any = gui.add_dropdown("Motion", self.choices.motions)

@@ -102,7 +102,7 @@ def _opacity(opacity: float) -> float | None:
 
 
 def _parts(model: mujoco.MjModel, body: int) -> list[list[int]]:
-    """The visible geoms of a body, those together that are drawn as one mesh."""
+    """Return the visible geoms of a body, those together that are drawn as one mesh."""
     parts: dict[tuple[object, ...], list[int]] = {}
     first = model.body_geomadr[body]
     for geom in range(first, first + model.body_geomnum[body]):

@@ -54,14 +54,14 @@ def check_port(host: str, port: int) -> None:
 def serving(host: str, port: int, visits: Visits | None = None) -> Iterator[viser.ViserServer]:
     """A server that ends with the block; raises ConfigError as `check_port`.
 
-    `visits` is told of pages that are opened.
+    `visits` is called for pages that are opened.
     """
     check_port(host, port)
     import viser
 
     with _silent(), own_pages_only(host in LOOPBACK, visits or Visits()):
         server = viser.ViserServer(host, port, label="Poise", verbose=False)
-    # A page could ask for a tunnel to the outside; nobody but the user decides who may look on.
+    # A page could request a tunnel to the outside; only the user may allow other viewers.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
     try:
         yield server
@@ -99,6 +99,6 @@ def greeting(host: str, port: int, link: str = "") -> list[str]:
 
 @contextlib.contextmanager
 def _silent() -> Iterator[None]:
-    """viser prints what `greeting` says better."""
+    """Suppress viser's own greeting; `greeting` replaces it."""
     with contextlib.redirect_stdout(io.StringIO()):
         yield

@@ -105,7 +105,7 @@ class Stage:
                 label.position = _below(frame) + up + offset
 
     def _show_ground(self, frames: Sequence[Frame]) -> None:
-        """Build what each robot stands on anew where it is another; a lane is as wide as it is."""
+        """Rebuild the ground of each robot where it changed; a lane is as wide as its ground."""
         ground = [frame.surfaces for frame in frames]
         if len(ground) == len(self._ground) and all(map(operator.is_, ground, self._ground)):
             return
@@ -174,7 +174,7 @@ class Stage:
 
 
 def _below(frame: Frame) -> np.ndarray:
-    """(3,) the ground below the centre of mass [m]."""
+    """Return (3,) the ground below the centre of mass [m]."""
     return ground_at(frame.com, frame.surfaces, frame.floor)
 
 

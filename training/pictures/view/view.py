@@ -45,7 +45,7 @@ def view(
         seed: of the start.
         pushes: scheduled ones, each a YAML mapping as `parse_pushes` takes it.
         commands: of controllers that walk, each a YAML mapping as `parse_commands` takes it.
-        realism: a packaged level of realism or a path to one.
+        realism: a packaged realism level or a path to one.
         native: MuJoCo's own window instead of a page, of one controller.
         seconds: of the wall clock after which it ends; None: when the process is stopped.
         dark: whether the page is dark.

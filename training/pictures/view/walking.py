@@ -67,12 +67,12 @@ class WalkSliders:
         self.own.visible = reach is not None
 
     def fields(self) -> dict[str, float]:
-        """The command that the sliders describe: fields of `GaitCommand`."""
-        told = {name: self._value(name) for name in VELOCITY}
-        told |= {name: self._value(name) for name in STEPS if name in self._commanded}
-        if not (told["ahead"] or told["left"]):
-            told.pop("step_length", None)  # nothing that stands has one
-        return told
+        """Return the command that the sliders describe: fields of `GaitCommand`."""
+        values = {name: self._value(name) for name in VELOCITY}
+        values |= {name: self._value(name) for name in STEPS if name in self._commanded}
+        if not (values["ahead"] or values["left"]):
+            values.pop("step_length", None)  # nothing that stands has one
+        return values
 
     def tell(self, gait: GaitCommand) -> None:
         """Show the command that holds, if it is another than before."""
@@ -117,7 +117,7 @@ class WalkSliders:
 
 
 def _ends(name: str, reach: Reach | None) -> tuple[float, float]:
-    """The least and the most of a slider, which are multiples of its step."""
+    """Return the least and the most of a slider, which are multiples of its step."""
     _, least, most, step, unit = SLIDERS[name]
     low, high = getattr(reach, name, (-math.inf, math.inf))
     least = max(least, low / unit, LEAST.get(name, -math.inf))
@@ -133,9 +133,9 @@ class Throttle:
         self.waiting: dict[str, float] | None = None  #: the newest value, until it is taken
 
     def take(self, now: float) -> dict[str, float] | None:
-        """The value that waits, if the last one was taken long enough before `now` [s].
+        """Return the pending value, if the last one was taken long enough before `now` [s].
 
-        Time may have begun anew since.
+        Time may have restarted since.
         """
         if self.waiting is None or abs(now - self._last) < self._period:
             return None

@@ -109,7 +109,7 @@ def test_a_clip_is_put_on_the_robot_once(tmp_path: Path, monkeypatch: pytest.Mon
     again = load_repertoire(["humanoid_stand"], ["humanoid_stand"], robot, tmp_path)
     assert again.digests["humanoid_stand"] == found.digests["humanoid_stand"]
     with pytest.raises(TypeError):  # it would be put on the robot again
-        load_repertoire(["humanoid_stand"], ["humanoid_stand"], robot, tmp_path, anew=True)
+        load_repertoire(["humanoid_stand"], ["humanoid_stand"], robot, tmp_path, fresh=True)
 
 
 def played(part: str, motion: str, share: float | None, impulse: float, won: bool) -> Any:

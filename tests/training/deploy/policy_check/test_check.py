@@ -217,9 +217,9 @@ def test_a_rollout_of_another_form(folder: Path, arrays: dict[str, Any], message
 @pytest.mark.parametrize(
     ("fell", "rollout", "code", "line"),
     [
-        (None, None, 0, "that it stands is a sign, no proof"),
+        (None, None, 0, "standing is evidence, not proof"),
         (1.2, None, 1, "it does not stand"),
-        (None, "full.npz", 0, "the adapter is right, as far as 6 of 7 findings tell"),
+        (None, "full.npz", 0, "the adapter is right, as far as 6 of 7 findings show"),
         (None, "wrong.npz", 1, "the adapter is wrong: 1 of 7 findings speak against it"),
     ],
 )

@@ -157,7 +157,7 @@ def test_what_cannot_run_on_a_robot_is_refused() -> None:
         load(realism={"sensors": {"velocity_nois": 0.1}})
     agent = load_agent("momentum-qp", robot())
     agent.env.estimator = EstimatorConfig("exact")
-    with pytest.raises(ConfigError, match="no sensor gives.*odometry"):
+    with pytest.raises(ConfigError, match="no sensor measures.*odometry"):
         SensedController(agent, load_realism("lab"))
     controller = load(realism="lab")
     with pytest.raises(PoiseError, match="before reset"):

@@ -138,10 +138,10 @@ def test_trials_that_cannot_be_played_again_are_left_out(tmp_path: Path) -> None
     fingerprint = load_results(folder).settings.robot_fingerprint
     path.write_text(path.read_text().replace(fingerprint, "f" * 64))
     text = write_report(folder).read_text()
-    assert "was not played again" in text and "has changed since" in text
+    assert "was not simulated again" in text and "has changed since" in text
     assert 'class="plot time"' not in text and 'id="ranking-table"' in text
     shorter = write_report(finished("random"), tmp_path / "plain.html", films=False).read_text()
-    assert "the report was asked to go without" in shorter and 'class="plot time"' not in shorter
+    assert "films were switched off" in shorter and 'class="plot time"' not in shorter
 
 
 def test_a_report_is_written_whole_or_not_at_all(

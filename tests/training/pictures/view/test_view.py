@@ -189,7 +189,7 @@ def test_a_session_is_filmed_from_its_start(
     import imageio_ffmpeg
 
     live = Live(load_session(["zero"], robot(), 0))
-    with pytest.raises(PoiseError, match="nothing has been played"):
+    with pytest.raises(PoiseError, match="nothing has been simulated"):
         live.film("zero", tmp_path / "b.mp4")
     for _ in range(10):
         live.step()

@@ -31,7 +31,7 @@ class Holding:
 
 
 def holding(robot: Robot, qpos: np.ndarray, soles: Sequence[int]) -> Holding:
-    """The torques τ that hold `qpos` at rest on these soles.
+    """Return the torques τ that hold `qpos` at rest on these soles.
 
     S τ = g(q) − τ_passive − Jᵀ f, with forces f at the soles' corners within pyramids inside of
     their friction cones; a joint without a motor bears its friction loss alone. A linear program
@@ -60,7 +60,7 @@ def holding(robot: Robot, qpos: np.ndarray, soles: Sequence[int]) -> Holding:
 
 
 def _corner_jacobians(robot: Robot, data: mujoco.MjData, sole: int) -> np.ndarray:
-    """(4 k, nv) Jᵀ of the edges of the friction pyramids at the sole's k corners."""
+    """Return (4 k, nv) Jᵀ of the edges of the friction pyramids at the sole's k corners."""
     foot, model = robot.soles[sole], robot.model
     friction = contact_friction(model, robot.ground_geom_id, foot.geom_ids) / np.sqrt(2.0)
     edges = [[x * friction, y * friction, 1.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)]

@@ -13,7 +13,7 @@ TINY = 1e-12  # of a change that is none
 
 
 def one_leg_qpos(robot: Robot, stance: int) -> np.ndarray | None:
-    """(nq,) the posture on the sole of number `stance`, None where the legs do not allow it.
+    """Return (nq,) the posture on the sole of number `stance`, None where the legs do not allow it.
 
     The CoM moves sideways until it is over that sole's reference point, and keeps its place fore
     and aft; the other sole rises by the clearance of a step. Of such postures it is one that is
@@ -61,7 +61,7 @@ def _tasks(robot: Robot, data: mujoco.MjData, stance: int) -> tuple[np.ndarray, 
 
 
 def _point(robot: Robot, data: mujoco.MjData, sole: int) -> np.ndarray:
-    """(3,) a sole's reference point [m]."""
+    """Return (3,) a sole's reference point [m]."""
     foot = robot.soles[sole]
     return data.xpos[foot.body_id] + data.xmat[foot.body_id].reshape(3, 3) @ foot.position
 

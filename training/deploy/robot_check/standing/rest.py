@@ -21,7 +21,7 @@ class Rest:
     It starts as trials do, a little off its posture: exactly at rest even what hums stays quiet.
 
     Attributes:
-        duration: that was played, or until it fell [s].
+        duration: simulated, or until it fell [s].
         fallen: whether it fell.
         chatter: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors, over the
             second half [1/s].
@@ -29,7 +29,7 @@ class Rest:
             stood after the first half [m].
         lean: of the root from the standing posture at the end [°].
         unsolved: control ticks at which the QP was not solved; `ticks`: all.
-        refused: why the controller does not take the robot; nothing is played then.
+        refused: why the controller does not support the robot; nothing is simulated then.
     """
 
     duration: float = 0.0
@@ -74,6 +74,6 @@ def stand_at_rest(robot: Robot) -> Rest:
 
 
 def _places(env: ResidualBalanceEnv) -> np.ndarray:
-    """(1 + feet, 2) the CoM and the soles from above [m]."""
+    """Return (1 + feet, 2) the CoM and the soles from above [m]."""
     state = env.simulation.state
     return np.vstack([state.com[:2], state.sole_points[:, :2]])

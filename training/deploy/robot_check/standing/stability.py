@@ -30,7 +30,7 @@ class DirectionFigures:
 
 
 def by_direction(limits: PushLimits) -> tuple[DirectionFigures, ...]:
-    """The figures of `DIRECTIONS`."""
+    """Return the figures of `DIRECTIONS`."""
     steps = NStepLimit(limits)
     return tuple(
         DirectionFigures(
