@@ -12,7 +12,8 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
 
-MUJOCO, DRAKE = "mujoco", "drake"
+MUJOCO: Final = "mujoco"
+DRAKE: Final = "drake"
 #: engine → the module that it needs, and how to get it
 NEEDS = {DRAKE: ("pydrake", "pip install 'poise[drake]', or pip install --no-deps drake")}
 
