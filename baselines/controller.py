@@ -96,7 +96,7 @@ class Targets(Copyable):
             cop=state.origin[:2].copy(),
         )
 
-    # (3,) L_ref [N·m·s] that the posture is to carry besides
+    # (3,) L_ref [N·m·s] that the posture carries in addition
     angular_momentum: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self):
@@ -142,7 +142,7 @@ NO_WRENCH.flags.writeable = False
 
 
 class BaseController(Copyable):
-    """A `Controller`, and what environments and reports ask of one besides, with defaults.
+    """A `Controller` with the further members that environments and reports use, with defaults.
 
     A subclass has `robot` and `period`, defines `torques`, and replaces what is different for it.
     """
@@ -151,7 +151,7 @@ class BaseController(Copyable):
     period: float  #: seconds between two calls of `torques`
     config: Any = None  #: that it was made from
     com_offset: float = 0.0  #: forward, of the CoM that it stands with from the motion's [m]
-    #: (8,) what it is told, `GaitCommand.array`, into which compiled code may write; None: nothing
+    #: (8,) its command, `GaitCommand.array`, into which compiled code may write; None: it has none
     orders: np.ndarray | None = None
     #: True of one that brings an estimator of its own: it gets what is measured, late and noisy
     raw_measurements: bool = False
@@ -200,8 +200,8 @@ class BaseController(Copyable):
 class CompiledController(BaseController):
     """A controller whose tick compiled code can run, without a call of Python.
 
-    The environment then never calls `torques`. So a subclass that defines `torques` anew runs from
-    Python, unless it also defines `compiled_tick` anew.
+    The environment then never calls `torques`. So a subclass that overrides `torques` runs from
+    Python, unless it also overrides `compiled_tick`.
     """
 
     _same_tick = True  # whether `compiled_tick` is of the class that `torques` is of, or below it
@@ -225,7 +225,7 @@ class CompiledController(BaseController):
         raise NotImplementedError
 
     def gains(self) -> Block:
-        """The block of gains that `compiled_tick` is bound to: it is bound anew to another one."""
+        """Return the block of gains that `compiled_tick` is bound to; another block rebinds it."""
         raise NotImplementedError
 
 

@@ -107,7 +107,7 @@ class PluginController(WrappedController):
         return _blank, (type(self), self.config.name), self.__getstate__()
 
     def another(self) -> BaseController:
-        """The same class with the same arguments, made anew."""
+        """Return a new instance of the same class with the same arguments."""
         return type(self)(self.robot, self.config)
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:

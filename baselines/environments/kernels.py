@@ -160,5 +160,5 @@ def performing() -> None:
 
 
 def sensing() -> None:
-    """Sensors, motors and what is believed of the state, where they are not ideal."""
+    """Compile sensors, motors and estimators of realism levels."""
     ResidualBalanceEnv(realism="lab", duration=0.1).reset(seed=0)

@@ -1,4 +1,4 @@
-"""Terms that tell of a controller's motion and steps, besides those of `envs.balance.mdp.terms`."""
+"""Terms of a controller's motion and steps, in addition to those of `envs.balance.mdp.terms`."""
 
 from dataclasses import dataclass
 

@@ -12,7 +12,7 @@ from .planner.reach import Reach
 
 @runtime_checkable
 class WalkingController(Protocol):
-    """What a controller that walks has, besides what every controller has.
+    """The further members of a controller that walks.
 
     `gait` and `memory` are the blocks that its compiled ticks work on. Compiled code may write
     `gait.command`, which is `command` as an array.
@@ -56,11 +56,11 @@ class ReachingWalker(Protocol):
 
     @property
     def reach(self) -> Reach:
-        """What its robot can be told, on the terrain that it believes to walk on."""
+        """The ranges of its commands, on the terrain that it assumes."""
 
 
 @runtime_checkable
 class TerrainWalker(Protocol):
     """What a controller that plans its steps on a terrain has: environments set it at the reset."""
 
-    terrain: Terrain  #: that it believes to walk on
+    terrain: Terrain  #: that it assumes

@@ -198,7 +198,7 @@ class StepEnd(Block):
 
 @compiled
 def end_step(end: StepEnd):
-    """Judge the step by the true state, and observe the believed one."""
+    """Judge the step by the true state, and observe the estimated state."""
     judge_step(end.judge)
     run(end.report)
     run(end.observe)

@@ -92,7 +92,7 @@ def planted_qpos(clip: Clip, robot: Robot) -> np.ndarray:
 def robot_clip_of(clip: Clip, robot: Robot, name: str, source: str = "") -> RobotClip:
     """A clip of the robot's skeleton as its motion: from standing to standing, on planted soles.
 
-    Soles that a clip with steps has in the air stay there; see `at_rest` for the others.
+    Swings of a clip with steps are kept; see `at_rest` for the other soles.
 
     Raises:
         ConfigError: a clip of another skeleton, or a posture that the robot cannot follow.
