@@ -66,7 +66,7 @@ _MEMBERS = attrgetter(*(item.name for item in fields(TargetArrays)))
 class Targets(Copyable):
     """References of one tick, world axes; nj = nv−6 joints.
 
-    Writing into the arrays changes what the controller sees at its next tick.
+    Writing into the arrays changes the targets of the controller's next tick.
     """
 
     q_ref: np.ndarray  #: (nj,) joint positions [rad]
@@ -123,9 +123,9 @@ class Targets(Copyable):
 
 @runtime_checkable
 class Controller(Protocol):
-    """A balance controller. It knows no environment and never sees a push.
+    """A balance controller. It is independent of the environment and does not observe pushes.
 
-    These three are enough. One that derives from `BaseController` can tell more of itself.
+    These three are enough. A subclass of `BaseController` can report more.
     """
 
     period: float  #: seconds between two calls of `torques`
@@ -168,7 +168,7 @@ class BaseController(Copyable):
 
     @property
     def root_wrench(self) -> np.ndarray:
-        """(6,) force [N] and moment [N·m] about the CoM that it asks for on the root, if soft."""
+        """(6,) external force [N] and moment [N·m] about the CoM on the root, if soft."""
         return NO_WRENCH
 
     @property
@@ -230,7 +230,7 @@ class CompiledController(BaseController):
 
 
 class WrappedController(BaseController):
-    """A controller around another one, `inner`, of which it tells what that tells of itself.
+    """A controller around another one, `inner`, whose further members it forwards.
 
     It calls `torques` of the inner one, which may be any `Controller`, for `robot`.
     """

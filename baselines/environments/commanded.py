@@ -125,6 +125,6 @@ class CommandedEnv(BalanceEnv):
 
 
 def check_reach(walker: WalkingController | None, command: GaitCommand) -> None:
-    """Raise ConfigError for a command out of the reach of a controller that knows its limits."""
+    """Raise ConfigError for a command outside the ranges of a controller that has them."""
     if isinstance(walker, LimitedWalker):
         walker.check_command(command)

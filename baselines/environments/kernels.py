@@ -128,7 +128,7 @@ def contacts() -> None:
 
 
 def planner() -> None:
-    """The planner of steps and the swing, and what a policy sees of them."""
+    """Compile the step planner, the swing, and their observation terms."""
     env, tick = _stepping()
     address_of(capture_tick, tick)
     address_of(energy_foothold, tick.search)

@@ -77,7 +77,7 @@ class ResidualBalanceEnv(ControlledEnv):
 
     Observation: <observation>
 
-    It does not know the push. `observation: {extra: [push_force, push_mean]}` adds the force that
+    The push is not observed. `observation: {extra: [push_force, push_mean]}` adds the force that
     is estimated from CoM and CoP, and its leaky mean. The reference is that of `motion`.
 
     A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the

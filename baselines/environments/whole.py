@@ -55,7 +55,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is that of `motion`.
+    The push is not observed. The reference is that of `motion`.
 
     <rewards>
 

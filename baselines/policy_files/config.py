@@ -94,7 +94,7 @@ class Held:
 
 @dataclass(frozen=True)
 class JointLaw:
-    """What a joint adds to its target, by the attitude that an IMU tells, and its factors.
+    """What a joint adds to its target, by the IMU's attitude, and its factors.
 
         q* = offset + action · scale · a + pitch · θ + pitch_rate · ω_y + roll · φ + roll_rate · ω_x
 

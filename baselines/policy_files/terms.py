@@ -1,4 +1,4 @@
-"""What a policy sees: terms by the names of mjlab, Isaac Lab and legged_gym."""
+"""Observation terms of policies, by the names of mjlab, Isaac Lab and legged_gym."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple

@@ -44,10 +44,10 @@ class Commanded:
 
 @runtime_checkable
 class LimitedWalker(Protocol):
-    """What a controller that walks and knows its robot's limits has."""
+    """The members of a walking controller with ranges of commands."""
 
     def check_command(self, command: GaitCommand) -> None:
-        """Raise ConfigError with these limits for a command out of reach."""
+        """Raise ConfigError with these limits for a command out of range."""
 
 
 @runtime_checkable

@@ -254,7 +254,7 @@ class MomentumQP(BoundQP, CompiledController):
 
 
 class AroundQP(BaseController):
-    """Holds the QP in `qp` and tells what it tells: period, CoM offset, failures, root wrench."""
+    """Holds the QP in `qp` and forwards its period, CoM offset, failures and root wrench."""
 
     def __init__(self, robot: Robot, qp: MomentumQPConfig):
         self.robot = robot

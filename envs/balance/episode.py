@@ -192,7 +192,7 @@ class StepEnd(Block):
     """The block of all that follows the last physics step of a policy step."""
 
     judge: Judge
-    report: Program  # what a controller tells of itself to the terms that observe it
+    report: Program  # what a controller reports to the terms that observe it
     observe: Program  # see `observer`
 
 

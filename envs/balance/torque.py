@@ -89,7 +89,7 @@ class TorqueBalanceEnv(MotorBalanceEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is the standing posture at rest.
+    The push is not observed. The reference is the standing posture at rest.
 
     <rewards>
 

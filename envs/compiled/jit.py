@@ -1,4 +1,4 @@
-"""The one Numba decorator of this package, and what a user sees when it compiles."""
+"""The one Numba decorator of this package, and its messages while it compiles."""
 
 import os
 import sys

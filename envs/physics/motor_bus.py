@@ -1,4 +1,4 @@
-"""What a computer and the motors tell each other: joint readings, torques, targets and gains."""
+"""Data between computer and motors: joint readings, torques, targets and gains."""
 
 from dataclasses import dataclass
 from typing import Annotated

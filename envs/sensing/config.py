@@ -47,8 +47,8 @@ class EstimatorConfig:
         load: Whether a load that lasts is learned and borne, where sensors err or bodies are drawn:
             a payload, masses and centres of mass that are other than known.
         load_time: Time in which a load is learned [s].
-        slide_speed: Speed from which soles are taken to slide, and then tell how much friction a QP
-            may count on [m/s]; 0: never.
+        slide_speed: Speed from which soles are taken to slide, and friction is estimated for the QP
+            [m/s]; 0: never.
         filtered: Whether joint velocities are filtered.
         joint_acceleration: Unmodelled acceleration of joints, step to step [rad/s²].
         turn_acceleration: Unmodelled angular acceleration of the root [rad/s²].

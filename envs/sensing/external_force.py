@@ -26,7 +26,7 @@ from .measurement import Rings
 
 SMOOTHING = 0.5  # of a new wrench in its low-pass, where sensors err
 CLEAR = 3.0  # deviations of the noise, below which there is no force
-LEARNING = 25  # ticks of an episode that tell the noise alone
+LEARNING = 25  # ticks of an episode that measure the noise alone
 MEMORY = 1.0  # [s] in which the noise is forgotten
 QUICK = 0.04  # [s] over which a wrench is averaged before it counts for a load
 START = 0.2  # [s] in which a load is learned at first

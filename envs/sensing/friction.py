@@ -51,7 +51,7 @@ def begin_friction(f: SlidingFriction, s: StateArrays, speed: float) -> None:
 
 @compiled
 def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings: Rings, row: int):
-    """Let `s.friction` follow what sliding soles tell, over the model's friction:
+    """Estimate `s.friction` from sliding soles, over the model's friction:
 
         μ = PIVOTS (|f_x| + |f_y|)/f_z,
 

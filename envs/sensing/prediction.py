@@ -91,7 +91,7 @@ class Rollout(Block):
 
     robot: RobotArrays
     views: SimViews
-    motors: Motors  # what they were asked for, which the computer knows
+    motors: Motors  # their past commands
 
 
 @compiled

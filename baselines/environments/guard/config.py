@@ -1,4 +1,4 @@
-"""The configuration of a guard: who walks, who recovers, and when one takes over from the other."""
+"""The configuration of a guard: walker, recovery policy, and when one replaces the other."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

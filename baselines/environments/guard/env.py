@@ -1,6 +1,6 @@
 """The environment of a recovery policy that guards a walker, and the guard's decision.
 
-At the start of each policy step the guard says who moves the robot.
+At the start of each policy step the guard selects the walker or the recovery policy.
 """
 
 from collections.abc import Mapping

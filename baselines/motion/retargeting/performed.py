@@ -70,7 +70,7 @@ def load_clip(file: str | Path, robot: Robot | None = None) -> tuple[Clip, str]:
 
 
 def clip_with_support(made: RobotClip, robot: Robot, name: str) -> Clip:
-    """A robot's motion as a clip, which knows its contacts if it has steps."""
+    """Return a robot's motion as a clip, with contacts if it has steps."""
     whole = clip_of_robot(robot, made.qpos, made.dt, name)
     support = None
     if made.planted is not None:

@@ -128,7 +128,7 @@ def _retargeted(
 
 
 def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted: bool) -> AskedOf:
-    """What a clip asks of a robot; arguments and errors as of `retarget`."""
+    """Return the targets of a clip on a robot; arguments and errors as of `retarget`."""
     for name, value in (("smooth", smooth), ("lead", lead)):
         if not 0.0 < value <= 100.0:
             raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)

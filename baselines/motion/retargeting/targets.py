@@ -1,4 +1,4 @@
-"""What a clip asks of any body: directions of its segments and the height of its pelvis."""
+"""Targets of a clip for any body: directions of its segments and the height of its pelvis."""
 
 from typing import NamedTuple
 

@@ -115,8 +115,8 @@ class Synthesis:
             if clip.support is None or joins is None:
                 continue
             if len(actions.names) > 1 and self.kind != PHYSICAL:
-                raise ConfigError(f"{shown(name)} has steps, which {self.kind} does not know: only "
-                                  f"{PHYSICAL} joins it", source=script.source)  # fmt: skip
+                raise ConfigError(f"{shown(name)} has steps, which {self.kind} does not support: "
+                                  f"only {PHYSICAL} joins it", source=script.source)  # fmt: skip
             for first, needed in ((True, i > 0), (False, i + 1 < len(actions.names))):
                 times = clip.times[clip.support.home]
                 late, early = latest_part(clip.duration), earliest_part(clip.duration)

@@ -218,7 +218,7 @@ def _check_clearance(
     needed = swing_time(robot, swing, command.clearance)
     if needed > time:
         raise _out_of_reach("clearance", f"{command.clearance:g} m in {time:.3g} s", robot,
-                            f"that in {needed:.3g} s, see step_time")  # fmt: skip
+                            f"it in {needed:.3g} s or more, see step_time")  # fmt: skip
 
 
 def _check_arms(command: GaitCommand, robot: Robot) -> None:
@@ -234,5 +234,5 @@ def _check_arms(command: GaitCommand, robot: Robot) -> None:
 
 
 def _out_of_reach(name: str, what: str, robot: Robot, limits: str) -> ConfigError:
-    return ConfigError(f"{what} is out of reach: {robot.name!r} can {limits}",
+    return ConfigError(f"{what} is out of range: {robot.name!r} supports {limits}",
                        field=f"command.{name}")  # fmt: skip

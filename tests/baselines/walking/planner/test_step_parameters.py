@@ -135,13 +135,13 @@ def test_a_width_is_commanded(width):
         ({"left": -2.0}, r"left: -2 m/s is .* to the side .* 'humanoid' can at most .* m/s"),
         (
             {"turn": 1.9},
-            r"turn: 1\.9 rad/s in steps of .* 'humanoid' can -.* \(-.*°/s\), where its hi",
+            r"turn: 1\.9 rad/s in steps of .* 'humanoid' supports -.* \(-.*°/s\), where its hi",
         ),
-        ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of reach.* joints end"),
-        ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of reach.* soles do not overlap"),
-        ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of reach"),
-        ({"ahead": 0.5, "arm_swing": 3.0}, r"arm_swing: 3 rad is out of reach.* at most"),
-        ({"ahead": 0.8, "step_length": 0.1}, r"step_length: 0\.1 m at 0\.8 m/s is out of reach"),
+        ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of range.* joints end"),
+        ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of range.* soles do not overlap"),
+        ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of range"),
+        ({"ahead": 0.5, "arm_swing": 3.0}, r"arm_swing: 3 rad is out of range.* at most"),
+        ({"ahead": 0.8, "step_length": 0.1}, r"step_length: 0\.1 m at 0\.8 m/s is out of range"),
     ],
 )
 def test_a_command_out_of_reach_is_refused_with_the_limits_of_the_robot(command, said):
