@@ -5,7 +5,7 @@ it is to run its module. `find_plugin`, the one function that imports what has b
 `check_allowed` first. Nothing is allowed to begin with; a scope is opened with
 
 - what the user types as a controller, or hands to an environment (`named`), and
-- what the user allows besides: ``--allow`` of a command, ``allow=`` in Python.
+- what the user also allows: ``--allow`` of a command, ``allow=`` in Python.
 
 A scope ends with its block, in its thread; processes are sent it with their work (`carried`).
 """
@@ -66,7 +66,7 @@ def check_allowed(name: str) -> None:
         asked.append(name)
     if _key(name, allowance.source, "controller") not in allowance.names:
         raise ConfigError(
-            f"wants to run code from outside, {name!r}: if you trust it, allow it by --allow "
+            f"runs external code, {name!r}: if you trust it, allow it by --allow "
             f"{shlex.quote(name)}, or poise.allowing({name!r}) in Python",
             source=allowance.source, field="controller",
         )  # fmt: skip
@@ -79,7 +79,7 @@ def listed(names: str | Iterable[str]) -> list[str]:
 
 @contextmanager
 def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) -> Iterator[None]:
-    """Inside, these classes may run, besides those that already may; a context.
+    """Context in which these classes may also run.
 
     Args:
         names: ``module:Class``, ``file.py:Class``, or a file of TorchScript; a file is the same by

@@ -66,7 +66,7 @@ _MEMBERS = attrgetter(*(item.name for item in fields(TargetArrays)))
 class Targets(Copyable):
     """References of one tick, world axes; nj = nv−6 joints.
 
-    Writing into the arrays changes what the controller sees at its next tick.
+    Writing into the arrays changes the targets of the controller's next tick.
     """
 
     q_ref: np.ndarray  #: (nj,) joint positions [rad]
@@ -96,7 +96,7 @@ class Targets(Copyable):
             cop=state.origin[:2].copy(),
         )
 
-    # (3,) L_ref [N·m·s] that the posture is to carry besides
+    # (3,) L_ref [N·m·s] that the posture carries in addition
     angular_momentum: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self):
@@ -123,9 +123,9 @@ class Targets(Copyable):
 
 @runtime_checkable
 class Controller(Protocol):
-    """A balance controller. It knows no environment and never sees a push.
+    """A balance controller. It is independent of the environment and does not observe pushes.
 
-    These three are enough. One that derives from `BaseController` can tell more of itself.
+    These three are enough. A subclass of `BaseController` can report more.
     """
 
     period: float  #: seconds between two calls of `torques`
@@ -142,7 +142,7 @@ NO_WRENCH.flags.writeable = False
 
 
 class BaseController(Copyable):
-    """A `Controller`, and what environments and reports ask of one besides, with defaults.
+    """A `Controller` with the further members that environments and reports use, with defaults.
 
     A subclass has `robot` and `period`, defines `torques`, and replaces what is different for it.
     """
@@ -151,7 +151,7 @@ class BaseController(Copyable):
     period: float  #: seconds between two calls of `torques`
     config: Any = None  #: that it was made from
     com_offset: float = 0.0  #: forward, of the CoM that it stands with from the motion's [m]
-    #: (8,) what it is told, `GaitCommand.array`, into which compiled code may write; None: nothing
+    #: (8,) its command, `GaitCommand.array`, into which compiled code may write; None: it has none
     orders: np.ndarray | None = None
     #: True of one that brings an estimator of its own: it gets what is measured, late and noisy
     raw_measurements: bool = False
@@ -168,7 +168,7 @@ class BaseController(Copyable):
 
     @property
     def root_wrench(self) -> np.ndarray:
-        """(6,) force [N] and moment [N·m] about the CoM that it asks for on the root, if soft."""
+        """(6,) external force [N] and moment [N·m] about the CoM on the root, if soft."""
         return NO_WRENCH
 
     @property
@@ -200,8 +200,8 @@ class BaseController(Copyable):
 class CompiledController(BaseController):
     """A controller whose tick compiled code can run, without a call of Python.
 
-    The environment then never calls `torques`. So a subclass that defines `torques` anew runs from
-    Python, unless it also defines `compiled_tick` anew.
+    The environment then never calls `torques`. So a subclass that overrides `torques` runs from
+    Python, unless it also overrides `compiled_tick`.
     """
 
     _same_tick = True  # whether `compiled_tick` is of the class that `torques` is of, or below it
@@ -225,12 +225,12 @@ class CompiledController(BaseController):
         raise NotImplementedError
 
     def gains(self) -> Block:
-        """The block of gains that `compiled_tick` is bound to: it is bound anew to another one."""
+        """Return the block of gains that `compiled_tick` is bound to; another block rebinds it."""
         raise NotImplementedError
 
 
 class WrappedController(BaseController):
-    """A controller around another one, `inner`, of which it tells what that tells of itself.
+    """A controller around another one, `inner`, whose further members it forwards.
 
     It calls `torques` of the inner one, which may be any `Controller`, for `robot`.
     """

@@ -83,7 +83,7 @@ class PluginController(WrappedController):
     """A controller from outside, whose torques are checked before they act.
 
     A wrong shape or a number that is not finite is an error: MuJoCo would act on zeros instead.
-    One that derives from `BaseController` tells more than its torques.
+    A subclass of `BaseController` reports more than its torques.
     """
 
     def __init__(self, robot: Robot, config: PluginConfig):
@@ -107,7 +107,7 @@ class PluginController(WrappedController):
         return _blank, (type(self), self.config.name), self.__getstate__()
 
     def another(self) -> BaseController:
-        """The same class with the same arguments, made anew."""
+        """Return a new instance of the same class with the same arguments."""
         return type(self)(self.robot, self.config)
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:

@@ -34,10 +34,10 @@ class CommandedEnv(BalanceEnv):
     option_names = (*RESET_OPTIONS, "command")  #: of `reset`
 
     def _take_walker(self, controller: BaseController) -> None:
-        """Take the controller that is told what to do, if it walks."""
+        """Take the controller that follows commands, if it walks."""
         decides = controller.unwrapped
         self._walker = decides if isinstance(decides, WalkingController) else None
-        #: (8,) what it is told; None where it follows no command
+        #: (8,) its command; None where it follows none
         self._orders: np.ndarray | None = getattr(decides, "orders", None)
         if self._walker is not None:
             self._orders = self._walker.gait.command
@@ -51,11 +51,11 @@ class CommandedEnv(BalanceEnv):
 
     @property
     def command(self) -> GaitCommand | None:
-        """What a controller that follows commands is told now; None for one that follows none.
+        """The command of a controller now; None for a controller that follows none.
 
         Setting it ends the commands of the reset. Raises ConfigError for a controller that does not
-        walk, and for a command out of the robot's reach. A policy from outside is told its velocity
-        and turn; it does not know the rest.
+        walk, and for a command out of the robot's range. A policy from outside is commanded
+        velocity and turn alone.
         """
         if self._walker is not None:
             return self._walker.command
@@ -80,7 +80,7 @@ class CommandedEnv(BalanceEnv):
 
     @property
     def reach(self) -> Reach | None:
-        """What the robot can be told; None where the controller does not walk, or does not say."""
+        """The ranges of its commands; None where the controller does not walk, or has none."""
         return self._walker.reach if isinstance(self._walker, ReachingWalker) else None
 
     @property
@@ -89,7 +89,7 @@ class CommandedEnv(BalanceEnv):
         return None if self._walker is None else float(self._walker.gait.transfer_time)
 
     def _expect_orders(self, source: str) -> np.ndarray:
-        """What the controller is told; raises ConfigError for one that does not walk."""
+        """Return the controller's command (8,); raise ConfigError for one that does not walk."""
         if self._orders is None:
             raise ConfigError(
                 f"the controller {self._decides} does not walk; give one that does",
@@ -119,12 +119,12 @@ class CommandedEnv(BalanceEnv):
             follow_timetable(self._follower(self._orders))
 
     def _follower(self, orders: np.ndarray) -> Follower:
-        """The block by which the controller is told its commands."""
+        """Return the block that writes the controller's commands."""
         clock = self.simulation.clock
         return Follower(self._timetable, clock, self.arrays.timestep, orders)
 
 
 def check_reach(walker: WalkingController | None, command: GaitCommand) -> None:
-    """Raise ConfigError for a command out of the reach of a controller that knows its limits."""
+    """Raise ConfigError for a command outside the ranges of a controller that has them."""
     if isinstance(walker, LimitedWalker):
         walker.check_command(command)

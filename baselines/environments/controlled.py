@@ -1,4 +1,4 @@
-"""A controller played in an environment: its ticks in a policy step, compiled or in Python."""
+"""A controller run in an environment: its ticks in a policy step, compiled or in Python."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -73,7 +73,7 @@ class ControlledEnv(CommandedEnv):
         # all others are called from Python, tick by tick
         self._compiled = isinstance(base, CompiledController) and base.compiled
         self._com_offset = float(base.com_offset)
-        self.believe_raw(base.raw_measurements)
+        self.use_raw(base.raw_measurements)
         self._unbind()
 
     def _unbind(self) -> None:

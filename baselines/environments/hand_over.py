@@ -46,9 +46,9 @@ class HandOverConfig:
         joint_speed: Speed of all joints together, root mean square, below which it counts as calm
             [rad/s].
         calm_time: Time for which it must be calm before the controller takes back [s].
-        uncertain: Distance that takes the place of `opens` and `closes` where joints and tilt
-            together may be biased by 0.02 rad or more, or somebody else moves the arms [m]; None:
-            these are it there, too.
+        uncertain: Distance that replaces `opens` and `closes` where joints and tilt together may
+            be biased by 0.02 rad or more, or external commands move the arms [m]; None: it is not
+            replaced.
     """
 
     opens: float = field(default=0.06, metadata={"above": 0.0})
@@ -64,7 +64,7 @@ class HandOverConfig:
             raise ValueError(f"closes: {self.closes} m is above opens, {self.opens} m")
 
     def distances(self, level: Realism) -> tuple[float, float]:
-        """The distances that open and close [m] at a level of realism."""
+        """Return the distances that open and close [m] at a realism level."""
         moved = bool(np.any(level.motors.arms))
         if self.uncertain is not None and (moved or level.misplaced >= MISPLACED):
             return self.uncertain, self.uncertain

@@ -128,7 +128,7 @@ def contacts() -> None:
 
 
 def planner() -> None:
-    """The planner of steps and the swing, and what a policy sees of them."""
+    """Compile the step planner, the swing, and their observation terms."""
     env, tick = _stepping()
     address_of(capture_tick, tick)
     address_of(energy_foothold, tick.search)
@@ -160,5 +160,5 @@ def performing() -> None:
 
 
 def sensing() -> None:
-    """Sensors, motors and what is believed of the state, where they are not ideal."""
+    """Compile sensors, motors and estimators of realism levels."""
     ResidualBalanceEnv(realism="lab", duration=0.1).reset(seed=0)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.baselines.balance.references.targets import Motion, update_targets
-from poise.baselines.balance.references.tempo import played_time
+from poise.baselines.balance.references.tempo import motion_time_of
 from poise.baselines.controller import Outputs, TargetArrays
 from poise.envs.balance.episode import (
     FAILURES,
@@ -99,7 +99,7 @@ def add_torques(r: Residual, limit: np.ndarray, ctrl: np.ndarray):
 
 @dataclass(frozen=True, eq=False)
 class TargetInputs(Block):
-    """The inputs of `set_targets`; the state is the believed one."""
+    """The inputs of `set_targets`; the state is the estimate."""
 
     robot: RobotArrays
     state: StateArrays
@@ -119,7 +119,7 @@ def set_targets(a: TargetInputs):
     if a.observes_push:
         observe_push(a.push, a.robot, a.state, a.period)
     now, motion = a.clock[0] * a.robot.timestep, a.motion
-    time = played_time(motion.pace, a.state, a.targets.com, motion.knots[0], now)
+    time = motion_time_of(motion.pace, a.state, a.targets.com, motion.knots[0], now)
     update_targets(a.robot, a.state, motion, time, a.com_offset, a.residual.offsets, a.targets)
 
 
@@ -157,8 +157,8 @@ def ask_motors(step: PolicyStep):
     if bus.q.shape[0] > 0 and o.target.shape[0] > 0:
         for i in range(world.views.ctrl.shape[0]):
             j = world.robot.motor_dofs[i] - 6
-            besides = world.views.ctrl[i] - o.tau[j]
-            ask_servo(bus, i, besides, o.target[j], o.stiffness[j], o.damping[j])
+            rest = world.views.ctrl[i] - o.tau[j]
+            ask_servo(bus, i, rest, o.target[j], o.stiffness[j], o.damping[j])
 
 
 @compiled

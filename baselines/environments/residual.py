@@ -9,7 +9,7 @@ import numpy as np
 
 from poise.baselines.allowance import allowing, named
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.reference_motion import ReferenceMotion, told
+from poise.baselines.balance.references.reference_motion import ReferenceMotion, command_options
 from poise.baselines.balance.references.targets import motion_arrays
 from poise.baselines.balance.references.tempo import TIME, Pace, Tempo
 from poise.baselines.controller import Controller, Targets, as_base_controller
@@ -77,7 +77,7 @@ class ResidualBalanceEnv(ControlledEnv):
 
     Observation: <observation>
 
-    It does not know the push. `observation: {extra: [push_force, push_mean]}` adds the force that
+    The push is not observed. `observation: {extra: [push_force, push_mean]}` adds the force that
     is estimated from CoM and CoP, and its leaky mean. The reference is that of `motion`.
 
     A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the
@@ -170,14 +170,14 @@ class ResidualBalanceEnv(ControlledEnv):
 
     @property
     def motion_time(self) -> float:
-        """The time of the motion that is played now; that since the reset unless it waits [s]."""
+        """Time of the motion now; that since the reset unless it waits [s]."""
         pace = self._motion.pace
         return float(pace.memory[TIME]) if pace.waits else self.simulation.time
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; robot and motion are shared.
 
-        Raises ConfigError for a controller that cannot be made anew: its memory cannot be shared.
+        Raises ConfigError for a controller that cannot be rebuilt: its memory cannot be shared.
         """
         given = self._known if self._controller is self._stand_in else self._controller
         return {
@@ -211,7 +211,7 @@ class ResidualBalanceEnv(ControlledEnv):
         return self._targets.q_ref, self._targets.v_ref
 
     def _suit_level(self) -> None:
-        """Let the controller be the one for this level of realism, see `where_uncertain`."""
+        """Choose the controller for this realism level, see `where_uncertain`."""
         if not any(self._controller is own for own in (self._known, self._stand_in)):
             return  # a user has put another one in its place
         wanted = self._known
@@ -232,7 +232,7 @@ class ResidualBalanceEnv(ControlledEnv):
             self._unbind()
         self.controller.reset(self.state_source.state)
         if "command" not in options and self.motion.commands is not None:
-            options = {**options, "command": told(self.motion.commands)}
+            options = {**options, "command": command_options(self.motion.commands)}
         self._begin_walk(options)
         self._motion.pace.clear()
         self._offsets[:] = 0.0

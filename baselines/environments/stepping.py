@@ -44,9 +44,9 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is that of `motion`.
+    The push is not observed. The reference is that of `motion`.
 
-    Info: besides those of `ResidualBalanceEnv`, "steps", begun in this episode.
+    Info: in addition to `ResidualBalanceEnv`'s, "steps" begun in this episode.
 
     Arguments: as of `ResidualBalanceEnv`; `controller` must be a `SteppingController`;
     `residual` is a `StepScales`.

@@ -1,4 +1,4 @@
-"""Terms that tell of a controller's motion and steps, besides those of `envs.balance.mdp.terms`."""
+"""Terms of a controller's motion and steps, in addition to those of `envs.balance.mdp.terms`."""
 
 from dataclasses import dataclass
 
@@ -71,7 +71,7 @@ def push_mean(t: ForceView):
     put_local(v.state, mean[0], mean[1], 0.02 * v.scales.weight, v.out)
 
 
-# entries of what a controller tells of its steps, see `Stepping.entries`
+# entries of the report of a controller's steps, see `Stepping.entries`
 STEPS, FOOT, FOOTHOLD, PHASE, REMAINING, SINCE = 0, 1, 2, 4, 5, 6
 REPORTED = 7
 

@@ -57,8 +57,8 @@ class VelocityEnv(CommandedEnv, PositionBalanceEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is the standing posture at rest. Where sensors err or
-    are late, all terms are of what is measured, as it is: nothing is estimated.
+    The push is not observed. The reference is the standing posture at rest. With sensor noise or
+    delay all terms are of the raw measurements: nothing is estimated.
 
     <rewards>
 

@@ -16,7 +16,7 @@ from poise.envs.physics.kinematics import StateArrays
 
 from .terms import PHASE, STEP_TERMS
 
-# entries of what is told of a walk
+# entries of the report of a walk
 WALKING, SIDE, CYCLE = range(3)  # 1 while it walks; the foot it stands on next; phase of the step
 WALK_REPORTED = 3
 
@@ -39,7 +39,7 @@ class Strides(Block):
 
 @dataclass(frozen=True, eq=False)
 class WalkReporter(Block):
-    """What a walk is told by, and what is told of it."""
+    """The block that reports a walk's state and strides."""
 
     gait: Gait
     memory: StepMemory
@@ -83,7 +83,7 @@ def measure_stride(r: WalkReporter):
 def report_walk(r: WalkReporter):
     """Keep the strides, and fill `report`; `steps` must be up to date.
 
-    Before the first stride the error is 0, and before the first step what is asked for.
+    Before the first stride the error is 0, and before the first step the command.
     """
     t, g, m = r.strides, r.gait, r.memory
     r.report[WALKING], r.report[SIDE], r.report[CYCLE] = g.walking[0], -1.0, 0.0

@@ -47,11 +47,11 @@ class ResidualWalkEnv(ResidualStepEnv):
 
     Observation: <observation>
 
-    It does not know the push. Pushes have the axes of the start. The reference is that of `motion`.
+    The push is not observed. Pushes have the axes of the start. The reference is that of `motion`.
 
-    Info: besides those of `ResidualStepEnv`, "command" (3,) [m/s, m/s, rad/s] and
-    "velocity_error" (3,) of the last stride, which `reward.tracking` is of. "is_success" is to
-    walk within 0.1 m/s of the command (of the humanoid, 0.036 ω h), or to rest where that is zero.
+    Info: in addition to `ResidualStepEnv`'s, "command" (3,) [m/s, m/s, rad/s] and
+    "velocity_error" (3,) of the last stride, which `reward.tracking` uses. "is_success" is to walk
+    within 0.1 m/s of the command (of the humanoid, 0.036 ω h), or to rest where that is zero.
 
     Arguments: as of `ResidualStepEnv`, with a `controller` that walks, and `command`: a
     `GaitCommand`, a mapping of `ahead`, `left` [m/s] and `turn` [rad/s] or of ranges [lo, hi] of

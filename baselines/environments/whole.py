@@ -49,13 +49,13 @@ class ResidualWholeEnv(ResidualBalanceEnv):
 
     Zero is the controller alone, bit for bit; so is any action near rest. The servos may take over
     from the moment when the capture point leaves the reference's by `hand_over.opens`, and until
-    the robot was calm for `hand_over.calm_time` (`HandOverConfig`); the controller then begins
-    anew, as at the start of an episode, wherever the feet stand. A scale above 0 in `residual`
-    puts entries that move the controller's targets before all others, see `ResidualBalanceEnv`.
+    the robot was calm for `hand_over.calm_time` (`HandOverConfig`); the controller then restarts,
+    as at the start of an episode, wherever the feet stand. A scale above 0 in `residual` puts
+    entries that move the controller's targets before all others, see `ResidualBalanceEnv`.
 
     Observation: <observation>
 
-    It does not know the push. The reference is that of `motion`.
+    The push is not observed. The reference is that of `motion`.
 
     <rewards>
 
@@ -86,7 +86,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         prepare("whole")
         self.servo_config = servo_config(servos)
         self._memory = guarded_zeros(ENTRIES)
-        self._callback = Callback(self._begin_anew)
+        self._callback = Callback(self._restart_controller)
         super().__init__(robot, config, controller=controller, **arguments)
         self.servos = make_servos(self.robot, self.servo_config)
 
@@ -123,7 +123,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         self._memory[OPENS], self._memory[CLOSES] = opens**2, closes**2
         self._callback.error = None
 
-    def _begin_anew(self) -> None:
+    def _restart_controller(self) -> None:
         """The controller's new trial; the failures of the episode's ticks stay counted."""
         controller = self.controller
         assert isinstance(controller, CompiledController)  # by `_accept`

@@ -1,1 +1,1 @@
-"""Learned policies from outside: read from their files, and played as controllers."""
+"""Learned policies from outside: read from their files, and run as controllers."""

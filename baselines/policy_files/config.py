@@ -94,7 +94,7 @@ class Held:
 
 @dataclass(frozen=True)
 class JointLaw:
-    """What a joint adds to its target, by the attitude that an IMU tells, and its factors.
+    """What a joint adds to its target, by the IMU's attitude, and its factors.
 
         q* = offset + action · scale · a + pitch · θ + pitch_rate · ω_y + roll · φ + roll_rate · ω_x
 
@@ -212,13 +212,13 @@ class PolicyFileConfig:
         phase: period of the clock that the terms ``phase``, ``phase_sin`` and ``phase_cos`` show
             [s].
         phase_offsets: how far each leg is ahead of the clock, of its period.
-        phase_runs: whether the clock runs always, or begins anew when a velocity is commanded.
+        phase_runs: whether the clock runs always, or restarts when a velocity is commanded.
         policy_period: of the policy [s].
         hold: joints that the policy does not have are held in the standing posture, critically
             damped, with this natural frequency [rad/s].
         digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in,
             whatever the YAML file says.
-        described_in: the file that says all this, for errors; filled in likewise.
+        described_in: the file with these fields, for errors; filled in.
         said: the fields that a file says; the others are as they are by default. Filled in.
     """
 

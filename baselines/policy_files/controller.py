@@ -56,7 +56,7 @@ class PolicyTick(Block):
 
     state: StateArrays
     servos: Servos
-    ask: CallbackAddress  # asks the policy for new targets
+    ask: CallbackAddress  # calls the policy for new targets
 
 
 @compiled
@@ -86,10 +86,10 @@ def observer_of(
 
 
 class PolicyFile(CompiledController):
-    """Plays a policy from its files: the network every `policy_period`, PD in every physics step.
+    """Run a policy from its files: the network every `policy_period`, PD in every physics step.
 
-    What it is asked to reach (`targets`) it does not know. Its command is that of `config`, or
-    what is written into `orders`; None where it sees no command.
+    It ignores `targets`. Its command is that of `config`, or what is written into `orders`; None
+    without an observation of a command.
 
     Raises ConfigError where policy and robot do not fit: the period is no whole number of physics
     steps, joints that the robot lacks, lists of other sizes than the joints, terms that do not add

@@ -89,7 +89,7 @@ def is_deploy(data: dict[str, object]) -> bool:
 
 
 def deploy_fields(data: dict[str, object], source: Path) -> dict[str, object]:
-    """Fields of a `PolicyFileConfig` from such a file; what it says besides is not looked at.
+    """Return fields of a `PolicyFileConfig` from such a file; other entries are ignored.
 
     Raises ConfigError for a missing field, a wrong type, and sizes that do not add up.
     """

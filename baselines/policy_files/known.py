@@ -80,11 +80,11 @@ def expect_network(origin: Origin, name: str) -> Path:
     found = find_network(origin)
     if found.network is not None:
         return found.network
-    told = ""
+    hint = ""
     if found.others:
-        told = (f"{found.others[0]} has another sum than the known one, and is played only by its "
-                f"path (base: {name}, policy: PATH in a .yaml file); ")  # fmt: skip
-    raise ConfigError(f"the network of {name} is not here: {told}get it by: {how_to_get(origin)}",
+        hint = (f"{found.others[0]} has another checksum than the known one, and runs only when "
+                f"you give its path (base: {name}, policy: PATH in a .yaml file); ")  # fmt: skip
+    raise ConfigError(f"the network of {name} is not here: {hint}get it by: {how_to_get(origin)}",
                       source=name, field="policy")  # fmt: skip
 
 

@@ -73,7 +73,7 @@ def onnx_session(path: Path) -> Any:
 
 
 class OnnxNetwork:
-    """A network in ONNX, played by onnxruntime; a recurrent one starts from zeros.
+    """A network in ONNX, run by onnxruntime; a recurrent one starts from zeros.
 
     Asking it raises PoiseError in one line where onnxruntime fails or takes too long, and where it
     remembers more than it did.
@@ -248,7 +248,7 @@ def _zeros(about: Any, path: Path) -> np.ndarray:
 
 
 class ScriptNetwork:
-    """A network in TorchScript; one that remembers is loaded anew for every trial."""
+    """A network in TorchScript; a recurrent one is reloaded for every trial."""
 
     def __init__(self, content: bytes, path: Path, config: PolicyFileConfig):
         self.content, self.path, self.config = content, path, config

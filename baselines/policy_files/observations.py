@@ -14,13 +14,13 @@ from .terms import COMMANDS, SIZES, KnownTerms, Place, Seen, Term, meaning
 
 
 def follows_commands(config: PolicyFileConfig) -> bool:
-    """Return whether a policy sees the velocity that is commanded."""
+    """Return whether a policy observes the commanded velocity."""
     parts = [part for parts in config.inputs.values() for part in parts]
     return any(meaning(term) in COMMANDS for part in parts for term in part.terms)
 
 
 def tracks_motion(config: PolicyFileConfig) -> bool:
-    """Return whether a policy sees a motion that it is to follow."""
+    """Return whether a policy observes a motion to follow."""
     parts = [part for parts in config.inputs.values() for part in parts]
     return any(meaning(term) in MOTION_TERMS for part in parts for term in part.terms)
 

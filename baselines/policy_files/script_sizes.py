@@ -39,7 +39,7 @@ def _answer_size(path: Path, shape: tuple[int, ...]) -> int | None:
     """The numbers of the first answer to zeros of a shape; None where it does not take them."""
     import torch
 
-    module = script_module(read_bytes(path, BYTES), path)  # one that remembers begins anew
+    module = script_module(read_bytes(path, BYTES), path)  # resets one that is recurrent
     kinds = (value.dtype for value in module.parameters())
     kind = next((each for each in kinds if each.is_floating_point), torch.float32)
     try:

@@ -1,4 +1,4 @@
-"""What a policy sees: terms by the names of mjlab, Isaac Lab and legged_gym."""
+"""Observation terms of policies, by the names of mjlab, Isaac Lab and legged_gym."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -62,7 +62,7 @@ CONSTANT, COMMAND = "constant", "velocity_commands"
 COMMAND_NAMES = {"ahead": 0, "left": 1, "turn": 2, "lin_vel_x": 0, "lin_vel_y": 1, "ang_vel_z": 2,
                  "ang_vel_yaw": 2}  # fmt: skip
 
-#: term → its numbers; besides these there are those of a constant
+#: term → its numbers; constants are terms as well
 TERMS: dict[str, Callable[[Seen], np.ndarray]] = {
     "base_lin_vel": lambda seen: _turned(seen, seen.state.qvel[:3]),
     "base_ang_vel": lambda seen: seen.state.qvel[3:6],

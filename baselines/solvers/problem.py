@@ -1,4 +1,4 @@
-"""A quadratic program, its solution, how good that is, and who finds it: solvers by name."""
+"""A quadratic program, its solution, the solution's residuals, and the solvers by name."""
 
 import dataclasses
 import time

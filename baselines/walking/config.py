@@ -97,7 +97,7 @@ class GaitConfig:
 
 @dataclass(frozen=True)
 class WalkConfig(CaptureStepConfig):
-    """`capture-step` that walks with this `gait` while it is told to."""
+    """`capture-step` that walks with this `gait` while commanded to."""
 
     kind: Literal["walk"] = "walk"  # type: ignore[assignment]
     gait: GaitConfig = field(default_factory=GaitConfig)

@@ -12,7 +12,7 @@ from .planner.reach import Reach
 
 @runtime_checkable
 class WalkingController(Protocol):
-    """What a controller that walks has, besides what every controller has.
+    """The further members of a controller that walks.
 
     `gait` and `memory` are the blocks that its compiled ticks work on. Compiled code may write
     `gait.command`, which is `command` as an array.
@@ -44,10 +44,10 @@ class Commanded:
 
 @runtime_checkable
 class LimitedWalker(Protocol):
-    """What a controller that walks and knows its robot's limits has."""
+    """The members of a walking controller with ranges of commands."""
 
     def check_command(self, command: GaitCommand) -> None:
-        """Raise ConfigError with these limits for a command out of reach."""
+        """Raise ConfigError with these limits for a command out of range."""
 
 
 @runtime_checkable
@@ -56,11 +56,11 @@ class ReachingWalker(Protocol):
 
     @property
     def reach(self) -> Reach:
-        """What its robot can be told, on the terrain that it believes to walk on."""
+        """The ranges of its commands, on the terrain that it assumes."""
 
 
 @runtime_checkable
 class TerrainWalker(Protocol):
     """What a controller that plans its steps on a terrain has: environments set it at the reset."""
 
-    terrain: Terrain  #: that it believes to walk on
+    terrain: Terrain  #: that it assumes

@@ -19,12 +19,12 @@ STEEPEST = 10.0  # [°] of ground that is walked on as if it were level
 
 
 def given_footholds(terrain: Terrain, robot: Robot, config: TreadConfig) -> list[Surface]:
-    """The surfaces on which a planner that believes in this terrain steps; none: all is free.
+    """Return the surfaces on which a planner steps that assumes this terrain; none: all is free.
 
     Raises ConfigError with the limits of this robot for one that cannot be stepped: treads shorter
     than its soles, steps that are too high or too far, slopes that are too steep.
     """
-    surfaces = terrain.believed()
+    surfaces = terrain.assumed()
     for surface in surfaces:
         angle = float(np.degrees(np.arctan(surface.gradient)))
         if abs(angle) > STEEPEST:

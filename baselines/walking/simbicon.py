@@ -130,10 +130,10 @@ class Simbicon(Commanded, BaseController):
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError for a step parameter: it follows velocity and turn alone."""
-        told = [name for name in STEP_PARAMETERS if getattr(command, name)]
-        if told:
+        refused = [name for name in STEP_PARAMETERS if getattr(command, name)]
+        if refused:
             raise ConfigError("is not followed by simbicon, which follows ahead, left and turn",
-                              field=f"command.{told[0]}")  # fmt: skip
+                              field=f"command.{refused[0]}")  # fmt: skip
 
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial, its command too."""

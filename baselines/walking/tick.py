@@ -1,4 +1,4 @@
-"""A tick of `Walk`, compiled: `capture_tick` until it is told to walk, then the gait.
+"""A tick of `Walk`, compiled: `capture_tick` until it is commanded to walk, then the gait.
 
 `walk_tick` is where to begin; the tick on one foot is in `step.py`.
 """
@@ -152,9 +152,9 @@ def transfer_tick(t: WalkTick) -> bool:
 
 @compiled
 def stands_higher(t: WalkTick) -> bool:
-    """Return whether the foot stands on ground that is higher than was believed: late in its swing
-    it touches, not on an edge of its sole, and does not come down where it is led. Asked only
-    by gaits for rough ground."""
+    """Return whether the foot stands on ground that is higher than assumed: late in its swing it
+    touches, not on an edge of its sole, and does not come down where it is guided. Used only by
+    gaits for rough ground."""
     c, w, foot = t.walk, t.walk.swing, t.walk.memory.foot[0]
     late = w.time[0] > LANDING * w.duration[0]
     if t.gait.lower <= 0.0 or footholds_given(t) or not late or c.state.contacts[foot] < 0.5:

@@ -76,10 +76,10 @@ class Walk(Commanded, CaptureStep):
     weight and walks: each foothold puts the capture point where the gait has it at lift-off
     (`dcm.py`), so that a push moves the foothold and the walk goes on. When the command is zero
     again it walks until both soles hold the capture point, and stands. Steps stay within what the
-    legs' motors can do; a robot whose feet could not be down again in time stands, whatever it is
-    told. On a `terrain` that gives footholds, such as stairs, each is on its tread (`treads.py`);
-    the CoM's height is that of the line through them then, whatever the gait's model. Raises
-    ConfigError as `CaptureStep` does.
+    legs' motors can do; a robot whose feet could not be down again in time stands, whatever the
+    command. On a `terrain` that gives footholds, such as stairs, each is on its tread
+    (`treads.py`); the CoM's height is that of the line through them then, whatever the gait's
+    model. Raises ConfigError as `CaptureStep` does.
     """
 
     kernel = staticmethod(walk_tick)
@@ -111,12 +111,12 @@ class Walk(Commanded, CaptureStep):
 
     @property
     def reach(self) -> Reach:
-        """What its robot can be told, on the terrain that it believes to walk on."""
+        """The ranges of its commands, on the terrain that it assumes."""
         return reach_of(self.robot, self.gait, self.gait_limits, self._gait_config.lifting)
 
     @property
     def terrain(self) -> Terrain:
-        """What it believes to walk on; may be set between trials.
+        """The terrain that it assumes; may be set between trials.
 
         Setting it raises ConfigError with the limits of the robot for what it cannot step on.
         """

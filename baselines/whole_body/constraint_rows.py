@@ -76,7 +76,7 @@ def point_cones(state: RobotState, points: Sequence[ContactRows]) -> Bounds:
 
 
 def sole_cones(state: RobotState, p: QPParameters) -> Bounds:
-    """cone · w ≤ 0 in each sole's own axes (see `wrench_cone`), for the friction that is believed.
+    """cone · w ≤ 0 in each sole's own axes (see `wrench_cone`), for the estimated friction.
 
     A cone of s times the friction has the same wrenches with f_x, f_y and n_z s times as large.
     """

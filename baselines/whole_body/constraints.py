@@ -25,7 +25,7 @@ def build_constraints(
 
 @compiled
 def _sole_cones(s: StateArrays, p: QPParameters, ws: Workspace):
-    """Fill cone · w ≤ 0 in each sole's own axes, for the friction that is believed.
+    """Fill cone · w ≤ 0 in each sole's own axes, for the estimated friction.
 
     With less of it forces along the sole and moments about its normal count for more.
     """

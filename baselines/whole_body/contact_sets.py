@@ -41,8 +41,8 @@ class ContactSets(BoundQP):
     """The momentum QP for each sole alone and for all; remembers torques between ticks.
 
     No torque changes by more than `torque_rate_limit` of its limit from one tick to the next,
-    whatever the contacts do: the QP knows this bound, and where it has no solution within, the
-    torques are cut.
+    whatever the contacts do: this is a bound of the QP; where the QP has no solution within it, the
+    torques are clipped.
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig, torque_rate_limit: float = np.inf):

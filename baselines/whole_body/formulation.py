@@ -85,7 +85,7 @@ def build(
         parameters: gains and limits in SI units: `MomentumQP.parameters`, or `qp_parameters`.
         cop_vel: (2,) ṗ, which a controller measures between its ticks; at rest if left out.
         tasks: such as `[task.rows(state) for task in controller.tasks.values()]`.
-        points: contacts of other bodies, likewise of `controller.contacts`.
+        points: contacts of other bodies, from `controller.contacts` in the same way.
         limits: such as `controller.limits.values()`.
     """
     p = parameters

@@ -28,7 +28,7 @@ def _above(bound: float, default: float):
 class PostureTask:
     """h_t = ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref − v))‖², weights per kind of joint.
 
-    Joints are told apart by what they carry: legs move one sole, the trunk moves several, the
+    Joints are classified by what they carry: legs move one sole, the trunk moves several, the
     rest (arms, head) none. Damping is d_t = 2 ζ √k_t. All weights fall to a fraction of themselves
     as the CoM leaves c_ref: β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally [Abe07]; then
     balance counts more than the posture.
@@ -111,7 +111,7 @@ class MomentumQPConfig:
 
     `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
     wrench u_root on it (a game character that must not fail). `tasks`: what else v̇ is to do, each
-    under a name of its own, see `tasks/`; `contacts`: what touches the world besides the soles, see
+    under a name of its own, see `tasks/`; `contacts`: contacts other than the soles, see
     `contacts/`; `limits`: what else bounds the solution, see `limits/`. Without `joint` (null)
     nothing stops joints before their limits. With `compensation` CoM and CoP lean against what
     pushes, see `compensation.py`.

@@ -1,4 +1,4 @@
-"""The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
+"""The baseline: a momentum-based whole-body QP, solved at every control tick."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -55,9 +55,8 @@ class BoundQP(Copyable):
     """A configuration of the momentum QP for one robot, and what outlives its ticks.
 
     Attributes:
-        tasks: those of the configuration by name; the arrays of a task's `block`, such as its
-            reference, may be written to at any time.
-        contacts, limits: likewise.
+        tasks, contacts, limits: those of the configuration by name; the arrays of their `block`,
+            such as a task's reference, may be written to at any time.
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig):
@@ -251,7 +250,7 @@ class MomentumQP(BoundQP, CompiledController):
 
 
 class AroundQP(BaseController):
-    """Holds the QP in `qp` and tells what it tells: period, CoM offset, failures, root wrench."""
+    """Holds the QP in `qp` and forwards its period, CoM offset, failures and root wrench."""
 
     def __init__(self, robot: Robot, qp: MomentumQPConfig):
         self.robot = robot

@@ -77,8 +77,8 @@ def _update_contacts(s: StateArrays, c: ContactArrays):
 
 @compiled
 def _eliminate_contacts(s: StateArrays, c: ContactArrays, p: QPParameters, ws: Workspace):
-    """Solve J v̇ = a − k_v J v − J̇ v of the soles, and of the points likewise, for v̇₀ and V; a is
-    zero but where a sole is in the air."""
+    """Solve J v̇ = a − k_v J v − J̇ v of the soles and of the points for v̇₀ and V; a is zero but for
+    a swing foot's sole."""
     for r in range(s.J.shape[0]):
         ws.contact_accel[r] = ws.sole_accel[r] - p.sole_damping * s.J_v[r] - s.Jdot_v[r]
     solve_resting(c.J, ws.contact_accel, ws.space, ws.vdot0, ws.V)

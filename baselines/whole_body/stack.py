@@ -1,4 +1,4 @@
-"""Tasks and limits of a reduced problem besides its own: which rows are whose."""
+"""Further tasks and limits of a reduced problem: which rows are whose."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -54,7 +54,7 @@ class Workspace(Block):
     force_weights: np.ndarray  # (k,) a view
     torque_weights: np.ndarray  # (nj,) a view
     space: NullSpace
-    sole_accel: Annotated[np.ndarray, "6nc"]  # a of the soles in the air; zero on the ground
+    sole_accel: Annotated[np.ndarray, "6nc"]  # a of swing feet's soles; zero on the ground
     contact_accel: Annotated[np.ndarray, "k"]  # that the contacts are to have: J v̇ + J̇ v less J̇ v
     y: Annotated[np.ndarray, 6]
     cop_prev: Annotated[np.ndarray, 2]  # last measured p
@@ -94,7 +94,7 @@ def allocate_workspace(
     Args:
         point_chains: for each point contact the degrees of freedom that move its body.
         point_rows: how many rows the cones of these have together.
-        limit_rows: how many rows there are of limits besides those of torques and joints.
+        limit_rows: rows of limits in addition to those of torques and joints.
     """
     space = allocate_null_space(len(robot.q_standing) + 6, sole_chains(robot), point_chains)
     points, nj, nc = len(point_chains), len(robot.q_standing), len(robot.sole_body)

@@ -179,7 +179,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     def _view(self, source: StateSource | Simulation, kind: type[Block], out: np.ndarray) -> Block:
         """The block of a term that fills `out`, of the `kind` that its kernel works on.
 
-        It reads the robot and the state of `source`: those that are believed, or the true ones.
+        It reads the robot and the state of `source`: the estimated ones, or the true ones.
         """
         world, block = self.simulation.world(), cast(Any, kind)
         q_ref, v_ref = self._references()
@@ -198,10 +198,10 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         return seen if kind is View else block(seen, *self._readings(kind))
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
-        """The members of a block of this `kind` besides its `View`: here of a `MeasuredView`."""
+        """Return the members that a block of this `kind` adds to `View`, as a `MeasuredView`."""
         source = self.state_source
         if isinstance(source, EstimatedState):
-            return source.sensors.rings, source.belief.steps, False
+            return source.sensors.rings, source.estimation.steps, False
         return Rings.allocate(self.simulation.sizes), guarded_zeros(1, int), True
 
     def _judge(self) -> Judge:
@@ -232,8 +232,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         if self._end is None or self._end_of is not world:
             e = self.episode
             seen, true = e.observation[: self.seen], e.observation[self.seen :]
-            believed = partial(self._view, self.state_source)
-            calls = observer(self._newest, seen, e.steps, believed)
+            estimated = partial(self._view, self.state_source)
+            calls = observer(self._newest, seen, e.steps, estimated)
             if self._privileged:
                 known = partial(self._view, self.simulation)
                 calls += observer(self._privileged, true, e.steps, known)
@@ -403,7 +403,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             "root_wrench": self.episode.root_wrench.copy(),
         }
         if self.drawn is not None:
-            info["realism"] = self.drawn_told.copy()
+            info["realism"] = self.drawn_summary.copy()
         return info
 
     def push_infos(self) -> list[PushInfo]:

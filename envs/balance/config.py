@@ -38,7 +38,7 @@ class ObservationConfig:
         history: Policy steps that the observation shows, all terms of a step side by side, the
             oldest first.
         privileged: Terms of this step that come last, of the true robot in its true state: for a
-            critic that sees more than the policy [Pinto18].
+            critic that observes more than the policy [Pinto18].
     """
 
     terms: tuple[str, ...] | None = None

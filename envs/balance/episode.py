@@ -192,13 +192,13 @@ class StepEnd(Block):
     """The block of all that follows the last physics step of a policy step."""
 
     judge: Judge
-    report: Program  # what a controller tells of itself to the terms that observe it
+    report: Program  # what a controller reports to the terms that observe it
     observe: Program  # see `observer`
 
 
 @compiled
 def end_step(end: StepEnd):
-    """Judge the step by the true state, and observe the believed one."""
+    """Judge the step by the true state, and observe the estimated state."""
     judge_step(end.judge)
     run(end.report)
     run(end.observe)

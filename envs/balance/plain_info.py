@@ -42,8 +42,8 @@ class PlainInfo(gym.Wrapper):
 def push_arrays(pushes: list[PushInfo], env: BalanceEnv) -> dict[str, np.ndarray]:
     """Each entry of `PushInfo` as an array (pushes,), of bodies their numbers in `env.model`."""
     numbers = [name for name in PushInfo.__annotations__ if name != "body"]
-    told: dict[str, np.ndarray] = {
+    arrays: dict[str, np.ndarray] = {
         name: np.array([push[name] for push in pushes], dtype=float)  # type: ignore[literal-required]
         for name in numbers
     }
-    return {**told, "body": np.array([env.model.body(push["body"]).id for push in pushes], int)}
+    return {**arrays, "body": np.array([env.model.body(push["body"]).id for push in pushes], int)}

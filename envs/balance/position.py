@@ -60,7 +60,7 @@ class PositionBalanceEnv(MotorBalanceEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is the standing posture at rest.
+    The push is not observed. The reference is the standing posture at rest.
 
     <rewards>
 

@@ -58,7 +58,7 @@ class MotorBalanceEnv(BalanceEnv):
         return self.arrays.q_standing, np.zeros(len(self.robot.joint_names))
 
     def _step_members(self) -> dict[str, Any]:
-        """The members of `step_block` besides those of a `MotorStep`."""
+        """Return the members that `step_block` adds to those of a `MotorStep`."""
         return {}
 
     def advance(self) -> None:
@@ -89,7 +89,7 @@ class TorqueBalanceEnv(MotorBalanceEnv):
 
     Observation: <observation>
 
-    It does not know the push. The reference is the standing posture at rest.
+    The push is not observed. The reference is the standing posture at rest.
 
     <rewards>
 

@@ -198,7 +198,7 @@ def _member(context: Any, builder: Any, kind: BlockType, block: Any, name: str) 
 
 
 def _array(context: Any, builder: Any, kind: types.Array, word: Any) -> Any:
-    """A borrowed array: nobody counts its references."""
+    """Return a borrowed array, whose references are not counted."""
     array = context.make_array(kind)(context, builder)
     item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
     shape = [word(1 + k) for k in range(kind.ndim)]

@@ -1,9 +1,9 @@
-"""Where compiled kernels are kept: only where nobody else can put any, for they are unpickled.
+"""The folder of compiled kernels: writable by the user alone, because kernels are unpickled.
 
-Whoever writes a file of the cache runs code in the process that reads it. So its folder belongs to
-the user, is closed to others, and lies where others cannot exchange it. Nor may it have come with
-what somebody works on: none below the working folder, except beside these sources, which are run
-anyway, and in the caches of a home that itself lies there.
+A file of the cache runs code in the process that reads it. So the folder belongs to the user, is
+closed to others, and lies where others cannot replace it. It must not come with a project that the
+user works on: folders below the working folder are refused, except beside these sources, which are
+run anyway, and in the caches of a home that itself lies there.
 """
 
 import contextlib
@@ -88,14 +88,14 @@ def _usable(root: Path, name: str) -> Path:
 
 
 def _below_working_folder(path: Path) -> bool:
-    """Whether a path came with what somebody works on; a home that lies there is the user's own."""
+    """Return whether a path lies in the project worked on; a home that lies there is trusted."""
     here, home = Path.cwd(), Path(os.path.expanduser("~"))
     own = home.is_absolute() and here in (home.resolve(), *home.resolve().parents)
     return here in path.parents and not own
 
 
 def check_trust(folder: Path) -> None:
-    """Refuse a folder that somebody else than the user can write to, or exchange for another.
+    """Refuse a folder that another user can write to or replace.
 
     Its owner, and those of the folders above, are the user or the system; of a folder that does
     not exist, those above count.

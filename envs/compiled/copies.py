@@ -59,7 +59,7 @@ class _Data:
         return _unpickled_data, (self.value.model, pickle.dumps(self.value), rest)
 
 
-#: what stands for an object, by its identity, while somebody is copying it
+#: what stands for an object, by its identity, while it is being copied
 _standing_in: WeakValueDictionary[int, Any] = WeakValueDictionary()
 
 

@@ -1,4 +1,4 @@
-"""The one Numba decorator of this package, and what a user sees when it compiles."""
+"""The one Numba decorator of this package, and its messages while it compiles."""
 
 import os
 import sys
@@ -60,7 +60,7 @@ def _decorated(function: Callable, cache: bool) -> Any:
     return numba.njit(
         cache=cache,
         nogil=True,
-        no_cfunc_wrapper=True,  # of which nobody makes use; a twentieth of the compilation
+        no_cfunc_wrapper=True,  # unused; it would cost a twentieth of the compilation
         error_model="numpy",
         fastmath=_FLAGS,
     )(function)
@@ -76,7 +76,7 @@ def _folder(function: Callable) -> Path | None:
         return None
 
 
-PATIENCE = 1.0  # [s] of compilation before the user is told
+PATIENCE = 1.0  # [s] of compilation before a message is printed
 
 
 def message(what: str) -> str:

@@ -3,7 +3,7 @@
 A kernel calls functions of other files, which are compiled into it, and reads constants of others.
 It knows them as globals of its module, so they come in by imports at the top of its file, or of one
 imported there. Kernels called by address are compiled apart, from files of their own; of a block a
-kernel's signature says all. How both are compiled is said in this room, which all kernels share.
+kernel's signature says all. How both are compiled is defined in this package, which all share.
 """
 
 import hashlib

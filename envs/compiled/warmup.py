@@ -107,7 +107,7 @@ def compile_here(module: ModuleType, parts: Sequence[str]) -> None:
 
 
 def begin() -> None:
-    """This process compiles: it has nothing to wait for, and its starter has told the user."""
+    """Mark this process as the one that compiles: it does not wait, and its parent prints."""
     global _compiling
     _compiling = True
     jit.patience.announced = True

@@ -1,4 +1,4 @@
-"""The arms of a robot, and somebody else who moves them: nothing that a controller asks is done."""
+"""Arms moved by external commands: what a controller commands of them is ignored."""
 
 from dataclasses import dataclass
 from itertools import chain
@@ -51,12 +51,12 @@ def find_arms(robot: Robot) -> tuple[Arm, ...]:
 
 @dataclass(frozen=True, eq=False)
 class MovedArms(Block):
-    """Servos of somebody else on the motors of both arms (n)."""
+    """Externally commanded servos on the motors of both arms (n)."""
 
     robot: RobotArrays
     views: SimViews
     motors: np.ndarray  # (n,) int: of the arms
-    moved: Annotated[np.ndarray, 1, np.int64]  # 1 where somebody moves them
+    moved: Annotated[np.ndarray, 1, np.int64]  # 1 where external commands move them
     step: Annotated[np.ndarray, 1, np.int64]  # physics steps since the reset
     period: int  # physics steps from one posture to the next
     seed: Annotated[np.ndarray, 1, np.uint64]  # see `uniform`
@@ -69,7 +69,7 @@ class MovedArms(Block):
 
 
 def allocate_arms(simulation: Simulation, known: Simulation) -> MovedArms:
-    """The arms of the robot that is `known`, standing, which nobody else moves yet."""
+    """Return the arms of the `known` robot, standing, not yet moved by external commands."""
     robot = known.robot
     joints = set(chain.from_iterable(arm.joints for arm in find_arms(robot)))
     motors = [i for i, dof in enumerate(robot.motor_dofs) if dof - 6 in joints]
@@ -89,14 +89,14 @@ def allocate_arms(simulation: Simulation, known: Simulation) -> MovedArms:
 
 
 def begin_arms(a: MovedArms, part: float, seed: int) -> None:
-    """Start an episode from the standing posture, in which `part` is 0 where nobody moves them."""
+    """Start an episode from the standing posture; without external commands `part` is 0."""
     a.part[0], a.moved[0], a.step[0] = part, int(part > 0.0), 0
     a.seed[0], a.goal[:] = seed, a.stand
 
 
 @compiled
 def move_arms(a: MovedArms):
-    """Replace the torques that act on the arms' motors by those of somebody else.
+    """Replace the torques of the arms' motors by those of the external servos.
 
     Once a period a posture is drawn within `part` of the way to each joint's limits, and reached
     with the least jerk: τ = I ω² (q* − q) − 2 I ω q̇, within the motor's limit. `views.ctrl` stays

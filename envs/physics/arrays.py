@@ -1,4 +1,4 @@
-"""The blocks of arrays in which compiled code sees a robot and one simulation.
+"""The blocks of arrays of a robot and one simulation, for compiled code.
 
 `RobotArrays` is constant and shared. `SimViews` holds views into one `MjData` and keeps it alive,
 so a kernel reads and writes the simulation itself.

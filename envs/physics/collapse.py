@@ -1,4 +1,4 @@
-"""A robot that has fallen and that nobody controls any more: it goes down with damped motors."""
+"""A fallen robot without a controller: it goes down with damped motors."""
 
 import numpy as np
 

@@ -42,8 +42,8 @@ class StateArrays(Block):
     momentum: Annotated[np.ndarray, 6]
     A: Annotated[np.ndarray, 6, "nv"]
     A_bias: Annotated[np.ndarray, 6]
-    load: Annotated[np.ndarray, 3]  # that is believed to last: f_z, and n_x, n_y about the CoM
-    friction: Annotated[np.ndarray, 1]  # of the ground that is believed, over the model's
+    load: Annotated[np.ndarray, 3]  # estimated sustained load: f_z, and n_x, n_y about the CoM
+    friction: Annotated[np.ndarray, 1]  # estimated, of the ground, over the model's
     J: Annotated[np.ndarray, "6nc", "nv"]
     Jdot_v: Annotated[np.ndarray, "6nc"]
     J_v: Annotated[np.ndarray, "6nc"]
@@ -194,7 +194,7 @@ def _contact(robot: RobotArrays, views: SimViews, s: StateArrays):
 
     The ground is the only thing outside the body, and joint limits and friction do not act on
     the root: so the root rows of the constraint force are the ground's wrench. They belong to the
-    root's pose before the last step, from which v has led to the present one.
+    root's pose before the last step.
     """
     R = s.root_axes
     dt, f, v = robot.timestep, views.qfrc_constraint, views.qvel
@@ -292,12 +292,12 @@ def touches_edge(robot: RobotArrays, views: SimViews, s: StateArrays, i: int) ->
     return False
 
 
-AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air
+AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one swings
 
 
 @compiled
 def update_support(robot: RobotArrays, s: StateArrays):
-    """Convex hull of the vertices of all soles that are not in the air (counter-clockwise,
+    """Update the convex hull of the vertices of all soles but swing feet (counter-clockwise,
     monotone chain). A foot that rocks on its edge still counts; one that steps does not."""
     n, lowest = 0, np.inf
     for i in range(s.sole_point.shape[0]):

@@ -1,4 +1,4 @@
-"""What a computer and the motors tell each other: joint readings, torques, targets and gains."""
+"""Data between computer and motors: joint readings, torques, targets and gains."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -17,7 +17,7 @@ class MotorBus(Block):
     """
 
     q: Annotated[np.ndarray, "nj"]  # joint positions that the motors read now [rad]
-    dq: Annotated[np.ndarray, "nj"]  # joint velocities likewise [rad/s]
+    dq: Annotated[np.ndarray, "nj"]  # joint velocities, also read now [rad/s]
     servoed: Annotated[np.ndarray, 1, np.int64]  # 1 where motors are asked for what follows
     torque: Annotated[np.ndarray, "nu"]  # u [N·m] of τ = u + K (q* − q) − D q̇
     target: Annotated[np.ndarray, "nu"]  # q* [rad]
@@ -26,7 +26,7 @@ class MotorBus(Block):
 
 
 def ideal_bus() -> MotorBus:
-    """The bus where motors are ideal: nothing is told."""
+    """Return the bus of ideal motors: it is empty."""
     return MotorBus.allocate({"nj": 0, "nu": 0})
 
 

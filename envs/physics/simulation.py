@@ -155,7 +155,7 @@ class Simulation(Copyable):
         qvel: np.ndarray | None = None,
         pushes: Sequence[Push | Kick] = (),
     ) -> RobotState:
-        """Start anew from `qpos` (nq,) and `qvel` (nv,): by default standing, at rest.
+        """Reset to `qpos` (nq,) and `qvel` (nv,): by default standing, at rest.
 
         Directions of pushes are relative to the heading at this moment.
         """

@@ -43,7 +43,7 @@ class RobotState(Copyable):
     motor_q = ArrayView()
     """(nv−6,) joint positions as the motors' own encoders read them now, never late [rad]."""
     motor_dq = ArrayView()
-    """(nv−6,) joint velocities likewise [rad/s]."""
+    """(nv−6,) joint velocities, also as the encoders read them now [rad/s]."""
     M = ArrayView()
     """(nv, nv) joint-space inertia."""
     h = ArrayView()
@@ -63,8 +63,8 @@ class RobotState(Copyable):
     A_bias = ArrayView()
     """(6,) such that A v̇ + A_bias is the ground's wrench about c: [Ṗ − m g; L̇]."""
     load = ArrayView()
-    """(3,) force f_z [N] and moments n_x, n_y about the known CoM [N·m] that are believed to
-    last, beside gravity and ground; h, A_bias and the CoM have them in already."""
+    """(3,) estimated sustained load, beside gravity and ground: force f_z [N] and moments n_x, n_y
+    about the known CoM [N·m]; h, A_bias and the CoM include it."""
     J = ArrayView()
     """(6 nc, nv) sole Jacobians: linear velocity of the reference point, then angular."""
     J_v = ArrayView()
@@ -113,7 +113,7 @@ class RobotState(Copyable):
 
     @property
     def friction(self) -> float:
-        """Friction of the ground that is believed, over that of the model: cones are so narrow."""
+        """Estimated friction of the ground, over that of the model; it scales the cones."""
         return float(self.arrays.friction[0])
 
     @property
@@ -145,7 +145,7 @@ class RobotState(Copyable):
 
     @property
     def support_polygon(self) -> np.ndarray:
-        """(k, 2) counter-clockwise hull of the soles that are not in the air [m]."""
+        """(k, 2) counter-clockwise hull of all soles but swing feet [m]."""
         update_support(self.robot, self.arrays)
         return self.arrays.support[: self.arrays.support_size[0]].copy()
 

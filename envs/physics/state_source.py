@@ -1,4 +1,4 @@
-"""The source of the state that a controller and a policy believe: by default the truth."""
+"""The state given to controller and policy: by default the true state."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from poise.envs.physics.state import RobotState
 
 
 class StateSource(Copyable):
-    """The source of what is believed of a simulation's state; of this class, the truth itself.
+    """The source of the estimated state of a simulation; this class gives the true state.
 
     An environment judges the simulation's own state. Its targets, its controller and its
     observation go by this one. A subclass has a state of its own and two programs of compiled
@@ -23,9 +23,9 @@ class StateSource(Copyable):
     Attributes:
         simulation: whose state it is about.
         promise: (nv,) where a controller writes the accelerations that it promises; (0,) where
-            nobody reads them.
-        arrays: the constants of the robot that is believed in.
-        state_arrays: the believed state; the same arrays for as long as the source exists.
+            they are not read.
+        arrays: the constants of the nominal robot.
+        state_arrays: the estimated state; the same arrays for as long as the source exists.
         bus: between the computer and the motors.
         drive: the program before every physics step, of motors that do not do what they are asked.
         sense: the program after every physics step.
@@ -45,7 +45,7 @@ class StateSource(Copyable):
 
     @property
     def state(self) -> RobotState:
-        """The believed state, as of the last `update`; its clock is the simulation's."""
+        """The estimated state, as of the last `update`; its clock is the simulation's."""
         return RobotState(self.arrays, self.state_arrays, self.simulation.time)
 
     def reset(self) -> None:

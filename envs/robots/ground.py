@@ -1,4 +1,4 @@
-"""Contacts with the ground: who touches whom, friction, the sensors that count; options."""
+"""Contacts with the ground: pairs, friction, contact sensors; options."""
 
 from collections.abc import Iterable
 

@@ -83,7 +83,7 @@ def _check_root(model: mujoco.MjModel, root: int) -> None:
             return
         trees = dict.fromkeys(model.body(model.body_rootid[model.jnt_bodyid[i]]).name
                               for i in others)  # fmt: skip
-        problem = (f"besides the robot {name!r} the model has other things that move: "
+        problem = (f"the model has moving parts other than the robot {name!r}: "
                    f"{', '.join(map(repr, trees))} ({_named(model, others)}): leave them out, or "
                    "name the robot's own file instead of a scene")  # fmt: skip
         floating = []

@@ -86,7 +86,7 @@ class Robot(Copyable):
         source: the file of the description.
         terrain: what it stands on.
         edge_adr: address of the directions of contacts, by foot name; on level ground none.
-        notes: what was changed of the model so that it can be played, a sentence each.
+        notes: changes to the model that made it simulable, a sentence each.
     """
 
     name: str

@@ -8,16 +8,16 @@ POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
 
 @dataclass(frozen=True)
 class InvariantConfig:
-    """What the invariant filter thinks of the world, besides the noises of the sensors.
+    """Process noise of the invariant filter; sensor noise comes from the realism level.
 
     Attributes:
-        gyro_bias: Bias of the gyroscope at the start, as `inekf` thinks [rad/s].
+        gyro_bias: Standard deviation of the gyroscope's bias at the start [rad/s].
         gyro_bias_walk: Change of that bias in a second [rad/s].
-        attitude: Error of the attitude besides its drift, taken as new in every step [rad].
-        kinematics: Error of a sole's place besides the encoders' noise [m].
+        attitude: Error of the attitude in addition to its drift, independent in every step [rad].
+        kinematics: Error of a sole's position in addition to the encoders' noise [m].
         slide: Way that a sole that bears the robot wanders in a second [m].
         roll: Way that such a sole wanders for each rad/s that it turns by [m].
-        lift: Way that a sole in the air may go in a second [m].
+        lift: Way that a swing foot's sole may go in a second [m].
     """
 
     gyro_bias: float = field(default=0.02, metadata=NOT_NEGATIVE)
@@ -38,23 +38,24 @@ class EstimatorConfig:
             legs that stand; `inekf` is the invariant Kalman filter of the same measurements;
             `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
             whose sensors have no errors, and else `odometry`.
-        predictor: Way in which the state is led on to when the torques of this tick will act:
+        predictor: How the state is predicted until the torques of this tick act:
             `promised` by the accelerations that the QP has promised, `rollout` by a simulation of
             the known robot with what its motors were asked for, `none` not at all; `auto` is
-            `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
+            `rollout` while motors run servos, whose accelerations are not predicted by the QP,
+            else `promised`.
         external_force: Whether a rollout is pushed on by the force that nothing else explains.
         load: Whether a load that lasts is learned and borne, where sensors err or bodies are drawn:
             a payload, masses and centres of mass that are other than known.
         load_time: Time in which a load is learned [s].
-        slide_speed: Speed from which soles are taken to slide, and then tell how much friction a QP
-            may count on [m/s]; 0: never.
+        slide_speed: Speed from which soles are taken to slide, and friction is estimated for the QP
+            [m/s]; 0: never.
         filtered: Whether joint velocities are filtered.
-        joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
-        turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
-        acceleration: Error of the accelerometer besides its noise, from step to step [m/s²].
+        joint_acceleration: Unmodelled acceleration of joints, step to step [rad/s²].
+        turn_acceleration: Unmodelled angular acceleration of the root [rad/s²].
+        acceleration: Error of the accelerometer in addition to its noise, step to step [m/s²].
         bias: Error of accelerometer and attitude together at the start [m/s²].
         bias_walk: Change of that error in a second [m/s²].
-        slip: Error of a velocity that one leg tells, besides the joints' noise [m/s].
+        slip: Error of a velocity measured by one leg, in addition to the joints' noise [m/s].
         roll_radius: Error of that velocity for each rad/s that the sole turns by [m].
         invariant: What only `inekf` goes by.
     """

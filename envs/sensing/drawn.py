@@ -46,11 +46,11 @@ class DrawnRobot:
     mass_factor: np.ndarray  #: (nb,) of each body's mass and inertia
     payload: float  #: on the loaded body, over the robot's mass
     friction: float | None  #: of the ground; None: as in the model
-    softness: float | None  #: likewise
+    softness: float | None  #: of contacts [s]; None: as in the model
     slope: np.ndarray  #: (2,) tangent of the ground's fall along x and y
     seed: int  #: of the noise within the episode
     bumps: float = 0.0  #: height of the highest bump [m]
-    arms: float = 0.0  #: part of their reach within which somebody else moves them; 0: nobody does
+    arms: float = 0.0  #: part of their reach within which external commands move them; 0: none do
     hand: float = 0.0  #: load in a hand, over the robot's mass
     side: int = 0  #: of that hand: 0 left, 1 right
     arms_seed: int = 0  #: of the postures of the arms
@@ -68,8 +68,8 @@ class DrawnRobot:
         return bool(other or (self.mass_factor != 1.0).any())
 
     def summary(self, timestep: float) -> dict[str, float]:
-        """The numbers that tell most of it, for `info` and tables: SI units, degrees."""
-        told = {
+        """Return its main numbers, for `info` and tables: SI units, degrees."""
+        numbers = {
             "sense_delay": self.sense * timestep,
             "command_delay": self.command * timestep,
             "lag": self.lag,
@@ -80,14 +80,14 @@ class DrawnRobot:
         }
         for name in ("friction", "softness"):
             if (value := getattr(self, name)) is not None:
-                told[name] = value
-        told |= {name: getattr(self, name) for name in LATER if getattr(self, name)}
+                numbers[name] = value
+        numbers |= {name: getattr(self, name) for name in LATER if getattr(self, name)}
         if self.hand:
-            told["side"] = self.side
-        return {name: round(value, 6) for name, value in told.items()}
+            numbers["side"] = self.side
+        return {name: round(value, 6) for name, value in numbers.items()}
 
 
-LATER = ("bumps", "arms", "hand")  # fields that are told where they are not 0
+LATER = ("bumps", "arms", "hand")  # fields that `summary` has where they are not 0
 NOISES = (
     *("encoder_noise", "velocity_noise", "gyro_noise", "accelerometer_noise"),
     *("tilt_drift", "force_noise", "cop_noise"),

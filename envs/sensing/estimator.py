@@ -1,4 +1,4 @@
-"""The state that is believed of a robot whose sensors and motors are real."""
+"""State estimation for a robot with sensor noise, delays and motor limits."""
 
 from __future__ import annotations
 
@@ -37,37 +37,37 @@ from .odometry import Odometry, begin_odometry, copy_axes, follow_measurements
 from .prediction import Promises, Rollout, keep_promises, predict, roll_out
 from .realism import Realism
 
-#: entries of `Belief.steps`
+#: entries of `Estimation.steps`
 SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(8)
-#: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
+#: `Estimation.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
 WITHOUT_CONTACTS: WeakKeyDictionary[Robot, Robot] = WeakKeyDictionary()
 SINK = 0.05  # of the height error of the soles that a tick takes away
 
 
 @dataclass(frozen=True, eq=False)
-class Belief(Block):
-    """All that `believe` works on."""
+class Estimation(Block):
+    """The block of `estimate_state`."""
 
     rings: Rings
     odometry: Odometry
     invariant: Invariant
-    robot: RobotArrays  # that is believed in
+    robot: RobotArrays  # the nominal one
     views: SimViews  # of its simulation
     state: StateArrays
     rollout: Rollout
     force: ExternalForce
     friction: SlidingFriction
     steps: Annotated[np.ndarray, 8, np.int64]  # physics steps, see SENSE and its like
-    axes: Annotated[np.ndarray, 3, 3]  # of the root, led on
-    q: Annotated[np.ndarray, "nj"]  # likewise
+    axes: Annotated[np.ndarray, 3, 3]  # of the root, predicted
+    q: Annotated[np.ndarray, "nj"]  # predicted
     v: Annotated[np.ndarray, "nv"]
     position: Annotated[np.ndarray, 3]
 
 
 @compiled
-def believe(b: Belief):
-    """The state that the known robot would have, from what has been measured until now."""
+def estimate_state(b: Estimation):
+    """Estimate the state of the nominal robot from the measurements until now."""
     r, o = b.rings, b.odometry
     now = r.count[0] - 1
     keep_promises(o.promises, now)
@@ -115,8 +115,8 @@ def believe(b: Belief):
 
 
 @compiled
-def _write_state(b: Belief, row: int):
-    """Fill `b.state` from the pose, the velocity and the forces of the soles that are believed."""
+def _write_state(b: Estimation, row: int):
+    """Fill `b.state` from the estimated pose, velocity and forces of the soles."""
     v, r, robot = b.views, b.rings, b.robot
     copy_into(b.position, v.qpos[:3])
     quaternion_of(b.axes, v.qpos[3:7])
@@ -135,7 +135,7 @@ def _write_state(b: Belief, row: int):
 
 
 @compiled
-def _stand_on_ground(b: Belief):
+def _stand_on_ground(b: Estimation):
     """Lead the root's height to where the soles that touch the ground are on it."""
     s, total, feet = b.state, 0.0, 0
     for i in range(s.contacts.shape[0]):
@@ -149,7 +149,7 @@ def _stand_on_ground(b: Belief):
 
 
 class EstimatedState(StateSource, Copyable):
-    """The believed state of a `Plant`, whose sensors and motors are those of the drawn robot.
+    """The estimated state of a `Plant`, whose sensors and motors are the randomised robot's.
 
     Args:
         plant: the true robot in its world.
@@ -161,8 +161,8 @@ class EstimatedState(StateSource, Copyable):
         super().__init__(plant.simulation)
         self.plant, self.config = plant, config
         terrain = plant.robot.terrain
-        believed = on_terrain(robot, terrain if terrain.believed() else Flat())
-        self.known, self.ahead = Simulation(without_contacts(believed)), Simulation(believed)
+        assumed = on_terrain(robot, terrain if terrain.assumed() else Flat())
+        self.known, self.ahead = Simulation(without_contacts(assumed)), Simulation(assumed)
         true, sizes = self.simulation, self.simulation.sizes
         world = {"robot": true.arrays, "views": true.views, "bus": MotorBus.allocate(sizes)}
         rings = Rings.allocate(sizes)
@@ -180,7 +180,7 @@ class EstimatedState(StateSource, Copyable):
         self.odometry = Odometry.allocate(sizes, **own, promises=promises)
         errors = {"n": 15 + 3 * sizes["nc"], **sizes}
         self.invariant = Invariant.allocate(errors, odometry=self.odometry)
-        self.belief = Belief.allocate(
+        self.estimation = Estimation.allocate(
             sizes,
             **own,
             odometry=self.odometry,
@@ -192,7 +192,7 @@ class EstimatedState(StateSource, Copyable):
         )
         self.drive = Program.of([(drive_motors, self.motors), (move_arms, self.arms)])
         self.sense = Program.of([(measure, self.sensors)])
-        self.estimate = Program.of([(believe, self.belief)])
+        self.estimate = Program.of([(estimate_state, self.estimation)])
 
     def begin(self, drawn: DrawnRobot, holding: np.ndarray) -> None:
         """Start an episode with the robot that was drawn.
@@ -211,7 +211,7 @@ class EstimatedState(StateSource, Copyable):
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
         pushed = c.external_force and horizon > 0 and SIMULATES[c.predictor] > 0
         loaded = c.load and (drawn.measured or drawn.loaded)
-        self.belief.steps[:] = (
+        self.estimation.steps[:] = (
             drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf", pushed,
             loaded,
         )  # fmt: skip
@@ -219,10 +219,10 @@ class EstimatedState(StateSource, Copyable):
 
     def _begin_estimate(self) -> None:
         """Set out from what was measured before the episode."""
-        loaded = self.belief.steps[LOADED] > 0
-        begin_force(self.belief.force, self.config.load_time if loaded else 0.0)
+        loaded = self.estimation.steps[LOADED] > 0
+        begin_force(self.estimation.force, self.config.load_time if loaded else 0.0)
         self.state_arrays.load[:] = 0.0
-        begin_friction(self.belief.friction, self.state_arrays, self.config.slide_speed)
+        begin_friction(self.estimation.friction, self.state_arrays, self.config.slide_speed)
         begin_odometry(self.odometry, self.drawn.noise, self.config)
         turn = np.zeros(4)
         quaternion_of(self.odometry.axes, turn)
@@ -236,7 +236,7 @@ class EstimatedState(StateSource, Copyable):
 
 
 def check_latency(level: Realism, timestep: float) -> None:
-    """Raise ConfigError where a level's delays and lag are longer than what can be led on."""
+    """Raise ConfigError where a level's delays and lag exceed the prediction's memory."""
     most = (RING - 2) * timestep
     parts = {
         "latency.sense": level.latency.sense,
@@ -246,8 +246,8 @@ def check_latency(level: Realism, timestep: float) -> None:
     }
     longest = {name: x[1] if isinstance(x, tuple) else x for name, x in parts.items()}
     if sum(longest.values()) > most:
-        told = ", ".join(f"{name} {value:g}" for name, value in longest.items() if value)
-        raise ConfigError(f"together at most {most:g} s can be led on: {told}",
+        sums = ", ".join(f"{name} {value:g}" for name, value in longest.items() if value)
+        raise ConfigError(f"delays and lag may sum to at most {most:g} s: {sums}",
                           source=level.name, field="latency")  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from .measurement import Rings
 
 SMOOTHING = 0.5  # of a new wrench in its low-pass, where sensors err
 CLEAR = 3.0  # deviations of the noise, below which there is no force
-LEARNING = 25  # ticks of an episode that tell the noise alone
+LEARNING = 25  # ticks of an episode that measure the noise alone
 MEMORY = 1.0  # [s] in which the noise is forgotten
 QUICK = 0.04  # [s] over which a wrench is averaged before it counts for a load
 START = 0.2  # [s] in which a load is learned at first
@@ -38,7 +38,7 @@ ARM = 0.2  # [h] at which such a part of the weight makes a moment
 class ExternalForce(Block):
     """The wrench that nothing explains: force [N] and moment about the CoM [N·m], world axes."""
 
-    wrench: Annotated[np.ndarray, 6]  # that is believed
+    wrench: Annotated[np.ndarray, 6]  # the estimate
     smooth: Annotated[np.ndarray, 6]  # low-passed
     noise: Annotated[np.ndarray, 2]  # mean squares of its force and of its moment
     momentum: Annotated[np.ndarray, 6]  # at the physics step `seen`
@@ -101,7 +101,7 @@ def keep_load(e: ExternalForce):
 
 @compiled
 def _take_ground(e: ExternalForce, s: StateArrays, r: Rings, now: int, steps: int):
-    """Subtract the ground's wrench, the mean of `steps` measurements, told about the CoM."""
+    """Subtract the ground's wrench about the CoM, the mean of `steps` measurements."""
     n, R = r.wrench.shape[0], s.root_axes
     newest = r.next[0] - 1 - (r.count[0] - 1 - now)
     x, y, z = s.qpos[0] - s.com[0], s.qpos[1] - s.com[1], s.qpos[2] - s.com[2]

@@ -1,7 +1,7 @@
-"""Friction of the ground, as sliding soles tell it.
+"""Friction of the ground, estimated from sliding soles.
 
 A sole that slides bears as much along the ground as friction lets it, so the ratio of what it bears
-along and across is the friction [Caron15]. Before it slides nobody knows more than the model.
+along and across is the friction [Caron15]. Before it slides the estimate is the model's value.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from poise.envs.robots.robot import Robot
 from .measurement import Rings
 
 PIVOTS = 1.25  # sliding soles pivot as well: they bear four fifths of what they could
-STEP = 0.02  # of the model's friction, by which a tick changes what is believed, after the first
+STEP = 0.02  # of the model's friction, by which a tick changes the estimate, after the first
 BEARS = 0.2  # of the weight, that they bear at least
-LEAST = 0.3  # of the friction of the model, that is believed in at least
+LEAST = 0.3  # of the friction of the model: the least estimate
 
 
 @dataclass(frozen=True, eq=False)
 class SlidingFriction(Block):
-    """What soles have told while they slid."""
+    """Measurements of the friction while soles slid."""
 
     known: float  # friction of the model
     speed: Annotated[np.ndarray, 1]  # from which a sole is taken to slide [m/s]; 0: never
     last: Annotated[np.ndarray, 1]  # ratio of the tick before, if soles slid in it, else 0
-    told: Annotated[np.ndarray, 1, np.int64]  # 1 once soles have told something
+    measured: Annotated[np.ndarray, 1, np.int64]  # 1 once a sole has slid
 
 
 def allocate_friction(robot: Robot) -> SlidingFriction:
@@ -45,19 +45,19 @@ def allocate_friction(robot: Robot) -> SlidingFriction:
 
 def begin_friction(f: SlidingFriction, s: StateArrays, speed: float) -> None:
     """Start an episode, in which nothing has slid; see `SlidingFriction.speed`."""
-    f.speed[0], f.last[0], f.told[0] = speed, 0.0, 0
+    f.speed[0], f.last[0], f.measured[0] = speed, 0.0, 0
     s.friction[0] = 1.0
 
 
 @compiled
 def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings: Rings, row: int):
-    """Let `s.friction` follow what sliding soles tell, over the model's friction:
+    """Estimate `s.friction` from sliding soles, over the model's friction:
 
         μ = PIVOTS (|f_x| + |f_y|)/f_z,
 
-    the mean of two ticks in a row. f, the force of the ground that was measured last, is told in
-    the axes of a sole that slides: as in the cone of the QP. What is told first is believed, then
-    each tick counts little: one that lands bears anything.
+    the mean of two ticks in a row. f, the force of the ground that was measured last, has the axes
+    of the sliding sole, as in the cone of the QP. The first value sets the estimate. Later ticks
+    change it by little, since a sole that lands bears any force.
     """
     slides = sliding_sole(s, f.speed[0]) if f.speed[0] > 0.0 else -1
     force, R, axes = rings.wrench[row], s.root_axes, s.sole_axes[slides]
@@ -71,11 +71,11 @@ def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings
     ratio, last = (abs(x) + abs(y)) / z, f.last[0]
     f.last[0] = ratio
     if last > 0.0:
-        told = 0.5 * PIVOTS * (last + ratio) / f.known
-        step = 1.0 if f.told[0] == 0 else STEP
-        change = min(max(told - s.friction[0], -step), step)
+        value = 0.5 * PIVOTS * (last + ratio) / f.known
+        step = 1.0 if f.measured[0] == 0 else STEP
+        change = min(max(value - s.friction[0], -step), step)
         s.friction[0] = min(max(s.friction[0] + change, LEAST), 1.0)
-        f.told[0] = 1
+        f.measured[0] = 1
 
 
 @compiled

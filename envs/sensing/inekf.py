@@ -171,7 +171,7 @@ def _lead_errors(f: Invariant):
 
 @compiled
 def _transpose(P: np.ndarray):
-    """P ← Pᵀ: rows are led on faster than columns, and P is symmetric before and after."""
+    """P ← Pᵀ: rows propagate faster than columns, and P is symmetric before and after."""
     for r in range(P.shape[0]):
         for c in range(r):
             P[r, c], P[c, r] = P[c, r], P[r, c]

@@ -65,7 +65,7 @@ def drive_motors(m: Motors):
         τ ← τ + (1 − exp(−dt/lag)) (gain (u + K (q* − q) − D q̇) − τ)
         |τ| ≤ τ_max · fraction_at(q̇)
 
-    `views.ctrl` stays what is asked for: the difference is a generalised force.
+    `views.ctrl` stays the command: the difference is a generalised force.
     """
     k, n = m.written[0], m.asked.shape[0]
     m.written[0] += 1

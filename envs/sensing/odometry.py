@@ -30,7 +30,7 @@ class Odometry(Block):
     """What is remembered of a robot (nj joints, nc soles), as of the last measurement."""
 
     robot: RobotArrays
-    state: StateArrays  # the state believed in the tick before: its Jacobians serve here
+    state: StateArrays  # the estimate of the tick before: its Jacobians are used here
     rings: Rings
     promises: Promises
     seen: Annotated[np.ndarray, 1, np.int64]  # measurements that have been used
@@ -41,7 +41,7 @@ class Odometry(Block):
     bias: Annotated[np.ndarray, 3]  # of the accelerometer and the attitude, world axes [m/s²]
     variance: Annotated[np.ndarray, 3]  # of a component of the root's v, with the bias, of that
     pressed: Annotated[np.ndarray, "nc", 3]  # of each sole: where pressed [m], its part of the load
-    told: Annotated[np.ndarray, 6]  # how a sole moves against a resting root [m/s, rad/s]
+    sole_v: Annotated[np.ndarray, 6]  # velocity of a sole relative to a resting root [m/s, rad/s]
     gains: Annotated[np.ndarray, 2, 2]  # rows q, q̇: corrections by errors of q and q̇
     numbers: Annotated[np.ndarray, 6]  # see STIR and its like
 
@@ -75,9 +75,9 @@ def begin_odometry(o: Odometry, noises: dict[str, float], c: EstimatorConfig) ->
 def filter_gains(dt: float, acceleration: float, noise_q: float, noise_v: float) -> np.ndarray:
     """(2, 2) gains of the stationary Kalman filter of a joint, whose state is (q, q̇).
 
-    An acceleration that nobody knows, of this standard deviation [rad/s²] and new in every step of
-    `dt` [s], moves the joint; position and velocity are measured with noises [rad, rad/s], of which
-    neither is taken for less than `LEAST`.
+    An unmodelled acceleration of this standard deviation [rad/s²], independent in every step of
+    `dt` [s], moves the joint; position and velocity are measured with noises [rad, rad/s], each at
+    least `LEAST`.
     """
     A = np.array([[1.0, dt], [0.0, 1.0]])
     B = np.array([[0.5 * dt * dt], [dt]])
@@ -191,17 +191,17 @@ def correct(o: Odometry, row: int, i: int):
     """Correct the velocity by sole i, whose pressed point rests: v = −(J_ω ω + J_q q̇) − ω_i × r.
 
     [1 J_ω J_q] is the Jacobian of the sole's middle, ω_i its angular velocity and r the pressed
-    point from there. What it tells is believed the less the noisier the joints' velocities are, the
-    less the sole bears, and the faster it turns.
+    point from there. The gain falls with the noise of the joints' velocities and with the sole's
+    angular velocity, and rises with the sole's share of the load.
     """
-    s, P, dq, told, axes = o.state, o.variance, o.rings.dq[row], o.told, o.state.sole_axes[i]
+    s, P, dq, sole_v, axes = o.state, o.variance, o.rings.dq[row], o.sole_v, o.state.sole_axes[i]
     for a in range(6):
         total = 0.0
         for b in range(3):
             total += s.J[6 * i + a, 3 + b] * o.rings.gyro[row, b]
         for j in range(dq.shape[0]):
             total += s.J[6 * i + a, 6 + j] * dq[j]
-        told[a] = total
+        sole_v[a] = total
     rx = axes[0, 0] * o.pressed[i, 0] + axes[0, 1] * o.pressed[i, 1]
     ry = axes[1, 0] * o.pressed[i, 0] + axes[1, 1] * o.pressed[i, 1]
     rz = axes[2, 0] * o.pressed[i, 0] + axes[2, 1] * o.pressed[i, 1]
@@ -211,9 +211,9 @@ def correct(o: Odometry, row: int, i: int):
         for j in range(3, o.v.shape[0]):
             rate += s.J[6 * i + a, j] * o.v[j]
         turning += rate * rate
-    told[0] += told[4] * rz - told[5] * ry
-    told[1] += told[5] * rx - told[3] * rz
-    told[2] += told[3] * ry - told[4] * rx
+    sole_v[0] += sole_v[4] * rz - sole_v[5] * ry
+    sole_v[1] += sole_v[5] * rx - sole_v[3] * rz
+    sole_v[2] += sole_v[3] * ry - sole_v[4] * rx
     reach = 0.0
     for a in range(3):
         for j in range(dq.shape[0]):
@@ -226,7 +226,7 @@ def correct(o: Odometry, row: int, i: int):
     P[VV] *= 1.0 - gain
     P[VB] *= 1.0 - gain
     for a in range(3):
-        error = -told[a] - o.v[a]
+        error = -sole_v[a] - o.v[a]
         o.v[a] += gain * error
         o.bias[a] += gain_bias * error
 

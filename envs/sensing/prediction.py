@@ -1,7 +1,7 @@
-"""The state that a robot will have when the torques of this tick act.
+"""Prediction of the state at which the torques of this tick act.
 
-What is measured is late, and so is what is asked for. In between the robot follows torques that are
-known already, and the QP has promised the accelerations that they bring.
+Measurements and commands are delayed. In between the robot follows torques that are known already,
+and the QP has predicted the accelerations that they cause.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .motors import DAMPING, STIFFNESS, TARGET, TORQUE, Motors
 class Promises(Block):
     """Accelerations that the controller has promised, one row for each physics step."""
 
-    last: Annotated[np.ndarray, "nv"]  # of the running tick; zero where nobody promises any
+    last: Annotated[np.ndarray, "nv"]  # of the running tick; zero if there are none
     rows: Annotated[np.ndarray, "n", "nv"]  # by the number of the physics step that asked for them
     written: Annotated[np.ndarray, 1, np.int64]  # physics steps whose rows are written
 
@@ -64,7 +64,7 @@ def predict(
 ):  # fmt: skip
     """Lead a state on from the physics step `first` by `count` steps of `dt` [s], in place.
 
-    In the step x the robot follows what was asked for in step x − `earlier`:
+    In step x the robot follows the command of step x − `earlier`:
 
         v ← v + v̇ dt,   position ← position + v dt,   R ← R exp(skew(ω dt)),   q ← q + q̇ dt
 
@@ -91,7 +91,7 @@ class Rollout(Block):
 
     robot: RobotArrays
     views: SimViews
-    motors: Motors  # what they were asked for, which the computer knows
+    motors: Motors  # their past commands
 
 
 @compiled
@@ -101,8 +101,8 @@ def roll_out(
 ):  # fmt: skip
     """Lead a state on by `count` physics steps of the known robot, in place.
 
-    In the step x its motors follow what was asked for in step x − `earlier`, as `drive_motors` has
-    it, by the joints of the simulation. All the while `wrench` (6,) acts on the root: a force, and
+    In step x its motors follow the command of step x − `earlier`, as `drive_motors` does, by the
+    joints of the simulation. All the while `wrench` (6,) acts on the root: a force, and
     a moment about the CoM of the robot at the start, world axes. Other arguments as of `predict`.
     """
     views, m, n = o.views, o.motors, o.motors.asked.shape[0]

@@ -63,7 +63,8 @@ class MotorErrors(RealismPart):
             [rad/s]; 0: never.
         backlash: Play between a joint and its encoder [rad].
         arms: Part of the way from the standing posture to the limits of the arms' joints, within
-            which somebody else moves them at random; what they are asked for is not done.
+            which external commands move them at random; the controller's commands to them are
+            ignored.
     """
 
     lag: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.1})
@@ -134,7 +135,7 @@ class GroundErrors(RealismPart):
         friction: Sliding friction of all geoms; None: the model's.
         softness: Least time constant of contacts, MuJoCo's `solref` [s]; None: the model's.
         slope: Slope of all ground in any direction, which is thought level [deg].
-        bumps: Height of the highest of the bumps around the start, which nobody knows of [m].
+        bumps: Height of the highest of the bumps around the start; no model has them [m].
     """
 
     friction: Spread | None = field(default=None, metadata={"above": 0.0, "max": 10.0})
@@ -148,7 +149,7 @@ class Realism:
     """A level: what an episode's robot is drawn from, see `draw_robot`.
 
     Attributes:
-        name: Name of the level, as it is told.
+        name: Name of the level, as printed.
         latency: How late measurements and torques are.
         motors: What motors do otherwise than they are asked.
         sensors: How sensors err.
@@ -183,7 +184,7 @@ class Realism:
     def misplaced(self) -> float:
         """What no filter takes out of legs' attitude: b_encoder + backlash + b_tilt at most [rad].
 
-        Times the leg's length it is how far beside itself a sole is believed.
+        Times the leg's length it is the error of a sole's estimated position.
         """
         biases = self.sensors.encoder_bias, self.motors.backlash, self.sensors.tilt_bias
         return sum(float(np.max(np.abs(bias))) for bias in biases)

@@ -1,4 +1,4 @@
-"""A robot in a simulation, how real it is, and the source of what is believed of its state."""
+"""A robot in a simulation, its realism level, and the source of its estimated state."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,13 +20,13 @@ from .realism import Realism, overlaid
 
 
 class SensedRobot:
-    """The base of what has a simulation, a level of realism and a `StateSource`."""
+    """Base of the classes with a simulation, a realism level and a `StateSource`."""
 
     robot: Robot  #: that is known; the simulated one may differ, see `Realism`
     physics = Physics()  #: of the engine that steps the robot
     estimator: EstimatorConfig  #: how the state is estimated where it is not known exactly
     drawn: DrawnRobot | None  #: of the running episode; None where it is the one that is known
-    drawn_told: dict[str, Any]  #: what `info` tells of it
+    drawn_summary: dict[str, Any]  #: what `info` tells of it
     _simulation: Simulation
     _state_source: StateSource
     _raw = False  # whether the controller brings an estimator of its own
@@ -43,8 +43,8 @@ class SensedRobot:
     def realism(self) -> Realism:
         """What the robot of an episode is drawn from; may be replaced between episodes.
 
-        Raises ConfigError for delays that are longer than what can be led on, for bumps on a
-        terrain, and for what arms do of a robot that has none.
+        Raises ConfigError for delays that are longer than the prediction's memory, for bumps on a
+        terrain, and for moved arms of a robot that has none.
         """
         return self._realism
 
@@ -71,7 +71,7 @@ class SensedRobot:
     def _estimator(self) -> EstimatorConfig:
         return RAW if self._raw else self.estimator
 
-    def believe_raw(self, raw: bool) -> None:
+    def use_raw(self, raw: bool) -> None:
         """Whether the controller gets what is measured, as it is, instead of an estimate."""
         if raw != self._raw:
             self._raw = raw
@@ -94,7 +94,7 @@ class SensedRobot:
 
     @property
     def state_source(self) -> StateSource:
-        """The source of what is believed of the state; may be replaced between episodes.
+        """The source of the estimated state; may be replaced between episodes.
 
         The simulation's own state is what is judged. Raises ConfigError for a source of another
         simulation.
@@ -136,7 +136,7 @@ class SensedRobot:
         self.drawn = draw_robot(level, self.robot, rng.spawn(1)[0])
         source.plant.become(self.drawn)
         timestep = self.robot.model.opt.timestep
-        self.drawn_told = {"level": self.realism.name, **self.drawn.summary(timestep)}
+        self.drawn_summary = {"level": self.realism.name, **self.drawn.summary(timestep)}
 
     def _begin_sensing(self) -> None:
         """Let the estimator begin; the simulation has just been reset."""

@@ -1,4 +1,4 @@
-"""Level ground with small things on it, of which nobody knows."""
+"""Level ground with small bumps that no planner or controller models."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -13,7 +13,7 @@ class Bumps(Terrain):
     """`count` bumps, squares of a `side` [m], at random within a `radius` around the start [m].
 
     Each is between `lowest` and `highest` high [m]. The ground is level within `clear` [m] of the
-    start, where the feet stand. A planner believes in level ground, whatever `unseen` says.
+    start, where the feet stand. A planner assumes level ground, whatever `unseen` says.
     """
 
     kind: Literal["bumps"] = "bumps"
@@ -51,5 +51,5 @@ class Bumps(Terrain):
         bumps.sort()
         return [Surface(-self.clear, self.clear, -self.clear, self.clear, 0.0, 0.0), *bumps]
 
-    def believed(self) -> list[Surface]:
+    def assumed(self) -> list[Surface]:
         return []

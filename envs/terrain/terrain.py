@@ -1,5 +1,4 @@
-"""What a robot walks on: surfaces above a floor, as a robot's planner believes them, and as they
-are."""
+"""Terrain: surfaces above a floor, as a planner assumes them, and as they are."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -40,9 +39,9 @@ class Terrain(OfKind):
     The start is at z = 0.
 
     Attributes:
-        error: Largest difference of a surface's height from what is believed, uniform in ± [m]; the
+        error: Largest difference of a surface's height from the assumed one, uniform in ± [m]; the
             start's has none.
-        unseen: Whether level ground is believed, without any surface to step on.
+        unseen: Whether planners assume level ground, without any surface to step on.
         seed: Seed of the heights' errors, and of what else a kind draws.
     """
 
@@ -70,8 +69,8 @@ class Terrain(OfKind):
         moved = zip(nominal, errors.tolist(), strict=True)
         return [surface._replace(height=surface.height + error) for surface, error in moved]
 
-    def believed(self) -> list[Surface]:
-        """The surfaces that a planner knows of; none: it believes in level ground."""
+    def assumed(self) -> list[Surface]:
+        """Return the surfaces that a planner assumes; empty for level ground."""
         return [] if self.unseen else self.nominal()
 
     def floor(self) -> float:

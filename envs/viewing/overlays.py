@@ -108,7 +108,7 @@ def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:
             size[1] = mark.radius
         mujoco.mjv_initGeom(geom, mark.shape, size, mark.start, np.eye(3).ravel(), rgba)
         if mark.shape != SPHERE:
-            # MuJoCo draws an arrow half as long as it is told
+            # MuJoCo draws an arrow at half the length given
             end = 2.0 * mark.end - mark.start if mark.shape == ARROW else mark.end
             mujoco.mjv_connector(geom, mark.shape, mark.radius, mark.start, end)
         geom.category = mujoco.mjtCatBit.mjCAT_DECOR

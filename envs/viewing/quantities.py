@@ -1,6 +1,6 @@
 """The colour of every quantity that is drawn, in pictures, videos and the viewer alike.
 
-The colours are from Okabe and Ito's palette, told apart with any colour vision. What has one of
+The colours are from Okabe and Ito's palette, distinct with any colour vision. What has one of
 them in a picture means this quantity and nothing else.
 """
 

@@ -1,4 +1,4 @@
-"""Environments that can be drawn: what Gymnasium asks of one."""
+"""Environments with Gymnasium's rendering interface."""
 
 from collections.abc import Mapping
 

@@ -128,5 +128,5 @@ def test_torchscript_plays_where_it_is_allowed(
     torch.jit.save(torch.jit.trace(torch.nn.Linear(3, 25), torch.zeros(1, 3)), folder / "policy.pt")
     assert evaluate(folder) == 2
     error = capsys.readouterr().err
-    assert "wants to run code" in error and f"--allow {folder / 'policy.pt'}" in error
+    assert "runs external code" in error and f"--allow {folder / 'policy.pt'}" in error
     assert evaluate(folder, "--allow", str(folder / "policy.pt")) == 0

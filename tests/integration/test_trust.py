@@ -59,7 +59,7 @@ from tests.support.shared import robot, tiny_config
 from tests.support.trap import NAMES, Ground, allowed_there, loaded_there
 
 ROOT = Path(__file__).parents[2]
-REFUSED = "wants to run code from outside"
+REFUSED = "runs external code"
 GAINS = {"arguments.gain": (0.1, 1.0)}
 
 

@@ -22,7 +22,7 @@ MAX_EDGES = 16  # rows kept per step; a polygon with fewer edges repeats its las
 
 @dataclass(frozen=True)
 class LIPMPCConfig:
-    """Horizon of `steps` of `step` seconds, planned anew every `replan` seconds.
+    """Horizon of `steps` of `step` seconds, replanned every `replan` seconds.
 
     Costs over that of the CoP's distance from c_ref: of the capture point's distance, of the
     CoP's change from step to step, and of the capture point at the end of the horizon.
@@ -115,7 +115,7 @@ class LIPMPC(Guided):
         self._high = np.concatenate([np.zeros(4 * n), np.ones(n * MAX_EDGES)])
 
     def cop(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """(2,) p [m]: planned anew every `replan` seconds, else that of the last plan."""
+        """Return p (2,) [m]: replanned every `replan` seconds, else that of the last plan."""
         if self._tick % self._ticks == 0:
             self._planned = self.plan(state, targets)[0]
         self._tick += 1

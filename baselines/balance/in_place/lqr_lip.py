@@ -1,4 +1,4 @@
-"""CoP by LQR on the linear inverted pendulum [Stephens07], which knows no support polygon."""
+"""CoP by LQR on the linear inverted pendulum [Stephens07], without a support polygon."""
 
 from dataclasses import dataclass, field
 from typing import Literal

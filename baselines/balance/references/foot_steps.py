@@ -1,4 +1,4 @@
-"""Steps of keyframe motions: when a foot is in the air, and the way that it goes there."""
+"""Steps of keyframe motions: when a foot swings, and its path."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class FootStep:
-    """A foot in the air from `lift` to `land`, through `way`, to `ahead` and `left` of standing."""
+    """A swing from `lift` to `land`, through `way`, to `ahead` and `left` of standing."""
 
     foot: Literal["left", "right"]
     lift: float = field(metadata={"min": 0.0})  # [s]
@@ -49,7 +49,7 @@ class FootStep:
 
 
 def check_steps(steps: Sequence[FootStep], duration: float) -> None:
-    """Raise ValueError unless one foot at a time is in the air, and both stand in the end."""
+    """Raise ValueError unless one foot at a time swings, and both stand at the end."""
     times = [t for step in steps for t in (step.lift, step.land)]
     if any(b - a < LEAST for a, b in pairwise(times)):
         raise ValueError(f"steps: one after the other, with {LEAST} s between, not {times}")

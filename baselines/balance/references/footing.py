@@ -25,8 +25,8 @@ COM, ROOT, PLACE, TURN, SPIN, COLUMNS = 0, 3, (6, 12), (9, 15), 18, 20
 CREEP = 0.01  # [m] by which a planted sole may be elsewhere than in the middle of its stance
 FLAT = 0.05  # [rad] by which it may be turned from there
 LIGHT = 0.7  # [m g] of the force on the ground: where it is less, the ZMP says nothing
-FREELY = 0.2  # of g by which the CoM of a robot in the air may accelerate otherwise
-BRIEF = 3  # frames that a sole is in the air at least, and on the ground
+FREELY = 0.2  # of g: largest deviation of the CoM's acceleration from free fall in flight
+BRIEF = 3  # least frames of a swing, and of a contact
 
 
 class FootingSample(NamedTuple):
@@ -96,7 +96,7 @@ def check_planted(planted: np.ndarray, source: str) -> None:
     for foot in range(2):
         changes = np.flatnonzero(np.diff(planted[:, foot].astype(int))) + 1
         if any(b - a < BRIEF for a, b in pairwise([0, *changes, len(planted)])):
-            raise ConfigError(f"a sole is planted or in the air for less than {BRIEF} frames",
+            raise ConfigError(f"a contact or swing lasts less than {BRIEF} frames",
                               source=source, field="contacts")  # fmt: skip
 
 

@@ -22,8 +22,8 @@ SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
 # root rolls where a leg's joint is at its limit
 ROUNDS, ROLLING = 6, 4
 MARGIN = 0.02  # [rad] that joints of legs keep from their limits
-LEAD = 0.5  # [s] in which the CoM is led to rest at both ends
-FLOATS = 0.02  # [m g] of the force on the ground, at least: in the air the CoM goes straight
+LEAD = 0.5  # [s] in which the CoM is blended to rest at both ends
+FLOATS = 0.02  # [m g] of the force on the ground, at least: in flight the CoM goes straight
 SOFT = 0.1  # [s] over which turns of the root are smoothed
 ROLLED, MOST_ROLL = 0.4, 0.1  # least rate of a joint that the root's roll helps; the roll [rad]
 AWAY, AWAY_BOTH = 0.04, 0.1  # [m] that the ZMP may be from where it is planned; and on both soles,

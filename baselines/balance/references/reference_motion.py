@@ -1,5 +1,5 @@
-"""A reference motion in time: joints, centre of mass and root of one robot; or what a planner of
-steps is told over time while the robot performs it."""
+"""A reference motion in time: joints, centre of mass and root of one robot; or the commands of a
+step planner over time while the robot performs it."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -20,7 +20,7 @@ STILL = 1e-6  # [rad, m] by which a posture that is held may change
 START, AHEAD, LEFT, TURN, STEP_TIME, COLUMNS = 0, 1, 2, 3, 4, 5
 MOST_COMMANDS = 200  # rows
 SHIFT, END = 0.7, 1.5  # [s] in which the weight shifts to the first foot; and to stand at the end
-RAMP, TURN_RAMP = 0.015, 0.08  # [g], [ω²] by which a planner gets to what it is told
+RAMP, TURN_RAMP = 0.015, 0.08  # [g], [ω²] by which a planner approaches the command
 
 
 class MotionSample(NamedTuple):
@@ -49,7 +49,7 @@ class ReferenceMotion(Copyable):
     Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see
     `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation. With
     `commands` (n, 5), of the columns START to STEP_TIME, it is what trunk and arms do while the
-    robot walks as it is told.
+    robot walks as commanded.
     """
 
     name: str
@@ -74,8 +74,8 @@ class ReferenceMotion(Copyable):
         powers = float(factor) ** np.arange(self.coeffs.shape[1])
         coeffs = self.coeffs * powers[:, None]
         footing = None if self.footing is None else self.footing.at_speed(factor)
-        told = None if self.commands is None else faster(self.commands, factor)
-        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing, told)
+        commands = None if self.commands is None else faster(self.commands, factor)
+        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing, commands)
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""
@@ -113,11 +113,11 @@ def whole_walk(
     joints = np.concatenate([
         rest + way * (joints[0] - rest), joints, joints[-1] + back * (rest - joints[-1])
     ])  # fmt: skip
-    told = commands.copy()
-    told[:, START] += first * dt
+    walked = commands.copy()
+    walked[:, START] += first * dt
     begin, end = commands[:1].copy(), np.zeros((1, COLUMNS))
     begin[0, START], end[0, START] = min(SHIFT, 0.5 * first * dt), (first + len(qpos) - 1) * dt
-    return joints, np.concatenate([begin, told, end])
+    return joints, np.concatenate([begin, walked, end])
 
 
 def _ramp(robot: Robot, row: np.ndarray) -> float:
@@ -131,8 +131,8 @@ def faster(commands: np.ndarray, factor: float) -> np.ndarray:
     return np.asarray(commands * [1 / factor, factor, factor, factor, 1 / factor])
 
 
-def told(commands: np.ndarray) -> list[dict[str, float]]:
-    """Commands as `reset` takes them."""
+def command_options(commands: np.ndarray) -> list[dict[str, float]]:
+    """Return commands as the option `command` of `reset` takes them."""
     names = ("start", "ahead", "left", "turn", "step_time")
     return [{name: float(value) for name, value in zip(names, row, strict=True) if value > 0.0
              or name != "step_time"} for row in commands]  # fmt: skip

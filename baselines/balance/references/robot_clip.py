@@ -57,7 +57,7 @@ class RobotClip:
         dt: time between frames [s].
         qpos: (F, nq) as MuJoCo has them.
         planted: (F, 2) bool, which soles are on the ground; None: both, always.
-            One that is `free` may have both in the air.
+            One that is `free` may have flight.
         commands: (n, 5) by which a planner walks as the postures do, from their first frame on, see
             `commanded.py`; None: soles go where the postures have them.
     """

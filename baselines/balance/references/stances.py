@@ -73,7 +73,7 @@ def home_frames(robot: Robot, qpos: np.ndarray, planted: np.ndarray) -> np.ndarr
 def why_not_home(robot: Robot, qpos: np.ndarray, planted: np.ndarray) -> str:
     """Why a posture (nq,) with `planted` soles (2,) is not one of `home_frames`; empty if it is."""
     if not planted.all():
-        return "a sole is in the air"
+        return "a foot swings"
     gap, turned = (float(values[0]) for values in away_from_home(robot, qpos[None]))
     if gap < NEAR and turned < NEARLY:
         return ""

@@ -34,7 +34,7 @@ NAMES = (
 )  # fmt: skip
 COM_X, COM_Y, COP_X, COP_Y, COM_Z, LEAN_X, LEAN_Y, MOMENTUM_X, MOMENTUM_Y = range(9)
 FOOTHOLD_X, FOOTHOLD_Y, TIME, TRIGGER = range(9, 13)
-TARGETS = NAMES[:FOOTHOLD_X]  # those of a controller that keeps its feet in place
+TARGETS = NAMES[:FOOTHOLD_X]  # those of a controller with feet fixed
 STEPS = NAMES[FOOTHOLD_X:]
 
 

@@ -12,7 +12,7 @@ from poise.envs.physics.kinematics import StateArrays
 AFTER = ("resume", "catch-up", "restart")
 CATCH_UP, RESTART = 1, 2
 CALM = 0.8  # β above which the robot counts as recovered
-HELD = 0.5  # β below which the motion begins anew, where it does
+HELD = 0.5  # β below which the motion restarts, with `restart`
 # what is remembered of a motion: its time [s], ṡ, s̈ [1/s], when the last tick was [s], 1 while it
 # goes back
 TIME, RATE, CHANGE, CLOCK, BACK = range(5)
@@ -24,7 +24,7 @@ class Tempo:
 
         β = exp(−(|c − c_ref|/d)²), horizontally,    τ s̈ = max(β, least) − ṡ
 
-    While a foot is in the air `least` is 0. After that the motion goes on from where it is
+    During a swing `least` is 0. After that the motion goes on from where it is
     (`resume`), runs up to `fastest` times as fast until it is on time (`catch-up`), or goes back to
     its begin first, if β fell below one half (`restart`).
 
@@ -34,7 +34,7 @@ class Tempo:
             standing height.
         lag: Time constant τ with which the rate of the motion follows [s].
         least: Least rate of the motion while both feet stand.
-        after: What comes after a wait: go on (resume), run until on time (catch-up), or begin anew
+        after: What follows a wait: continue (resume), run until on time (catch-up), or begin again
             (restart).
         fastest: Largest rate of the motion while it catches up.
     """
@@ -74,7 +74,7 @@ def make_pace(tempo: Tempo, height: float) -> Pace:
 
 
 @compiled
-def played_time(p: Pace, s: StateArrays, com_ref: np.ndarray, begin: float, now: float) -> float:
+def motion_time_of(p: Pace, s: StateArrays, com_ref: np.ndarray, begin: float, now: float) -> float:
     """The motion's time [s] at `now` [s] after the reset, as its time runs since the last call.
 
     `com_ref` (3,) is where the CoM was to be then [m], `begin` [s] the motion's first time.

@@ -1,4 +1,4 @@
-"""Feet in place as long as that holds; then steps to where the capture point can be stopped."""
+"""Balance with feet fixed while this suffices; then steps to where the capture point can stop."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -70,7 +70,7 @@ def allocate_step_memory(region: CopRegion) -> StepMemory:
 
 
 class CaptureStep(AroundQP, CompiledController, SteppingController):
-    """The momentum QP with feet in place, and steps by capturability where those cannot hold.
+    """The momentum QP with feet fixed; capturability-based steps where the ankles do not suffice.
 
     Stands by `qp`, bit for bit, until the capture point ξ leaves what the CoP can reach; then
     steps until it is inside again, and stays where it came to rest. In a step the CoM follows

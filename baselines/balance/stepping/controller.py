@@ -80,5 +80,5 @@ class SteppingController(BaseController):
 
     @property
     def step_limits(self) -> StepLimits | None:
-        """The steps that the controller allows itself, or None if it knows no limits."""
+        """The limits of the controller's steps, or None if it has none."""
         return None

@@ -46,9 +46,9 @@ class IPMStep(CaptureStep):
 
     Each is where the pendulum stands still, from where it is at touchdown. Until then the CoP is
     taken to stay at p, where the stance sole brakes most; the cost is how far limits keep the
-    foothold from the one desired [m]. Feet in place, the trigger of a step, the swing, and balance
-    on one foot and after are those of `capture-step`. Raises ConfigError unless there are two
-    soles.
+    foothold from the one desired [m]. Balance with feet fixed, the trigger of a step, the swing,
+    and balance on one foot and after are those of `capture-step`. Raises ConfigError unless there
+    are two soles.
     """
 
     foothold_rule = staticmethod(energy_foothold)

@@ -135,7 +135,7 @@ def limit_load(t: CaptureTick, most: float) -> None:
 
 @compiled
 def replan_swing(t: CaptureTick) -> None:
-    """Plan the rest of the running step anew, and lead its foot there."""
+    """Replan the rest of the running step, and guide its foot there."""
     m, w, q, r = t.memory, t.swing, t.search, t.recentring
     q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
     if r.stage[0] != SWINGING or not replan_recentring(q, r, w):
@@ -190,7 +190,7 @@ def double_support_tick(t: CaptureTick) -> None:
 
 @compiled
 def standing_tick(t: CaptureTick) -> None:
-    """A tick before the first step: the QP with the feet in place."""
+    """A tick before the first step: the QP with feet fixed."""
     call(t.standing_kernel, t.standing)
     copy_into(t.standing.problem.workspace.tau, t.tau)
     copy_into(t.standing.problem.workspace.vdot, t.vdot)

@@ -1,4 +1,4 @@
-"""The configuration of a guard: who walks, who recovers, and when one takes over from the other."""
+"""The configuration of a guard: walker, recovery policy, and when one replaces the other."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +20,7 @@ class GuardConfig:
 
     It takes over when the capture point is further than `margin` outside of the support polygon, or
     the root's tilt is beyond `tilt`. It hands back once the robot was calm for `calm_time`, by the
-    measure of the policy's own `hand_over`; the walker then begins anew, with its command.
+    measure of the policy's own `hand_over`; the walker then restarts, with its command.
 
     Attributes:
         walker: A policy from outside that follows a commanded velocity: a name or a path.
@@ -52,7 +52,7 @@ def is_guard(name: str | Path) -> bool:
 
 
 def guard_config(name: str | Path) -> GuardConfig:
-    """A packaged guard or a path to one; `base` names another one, whose fields hold besides.
+    """Read a packaged guard or a path to one; fields that it omits are those of its `base`.
 
     Raises ConfigError naming the file, the field and the choices.
     """

@@ -1,6 +1,6 @@
 """The environment of a recovery policy that guards a walker, and the guard's decision.
 
-At the start of each policy step the guard says who moves the robot.
+At the start of each policy step the guard selects the walker or the recovery policy.
 """
 
 from collections.abc import Mapping
@@ -52,7 +52,7 @@ class GuardStep(Block):
 
 @compiled
 def is_off(g: Guard, step: PolicyStep) -> bool:
-    """Return whether what is believed of the robot is beyond the guard's limits."""
+    """Return whether the estimated state is beyond the guard's limits."""
     robot, s = step.inputs.robot, step.inputs.state
     update_support(robot, s)
     outside = -support_distance(s, s.capture_point[0], s.capture_point[1])
@@ -61,7 +61,7 @@ def is_off(g: Guard, step: PolicyStep) -> bool:
 
 @compiled
 def set_guard(g: Guard, h: HandOver, step: PolicyStep):
-    """Take over, or hand back to the walker, which begins anew."""
+    """Take over, or hand back to the walker, which restarts."""
     a, m = step.inputs, h.memory
     if m[OPEN] == 0.0:
         if is_off(g, step):
@@ -94,8 +94,8 @@ class GuardedEnv(ResidualWholeEnv):
 
     Observation: <observation>
 
-    Walker, guard and observation go by the same estimate of the state: the guard needs the velocity
-    of the root, which nobody measures.
+    Walker, guard and observation use the same estimate of the state: the guard needs the velocity
+    of the root, which no sensor measures.
 
     <rewards>
 
@@ -117,9 +117,9 @@ class GuardedEnv(ResidualWholeEnv):
         """How often the guard took over in this episode."""
         return int(self._guard.count[0])
 
-    def believe_raw(self, raw: bool) -> None:
-        """The state is estimated, whatever the walker would be content with."""
-        super().believe_raw(False)
+    def use_raw(self, raw: bool) -> None:
+        """Estimate the state, also for a walker that takes raw measurements."""
+        super().use_raw(False)
 
     def arguments(self) -> dict[str, Any]:
         return {**super().arguments(), "guard": self.guard}
@@ -128,11 +128,11 @@ class GuardedEnv(ResidualWholeEnv):
         super()._begin(options)
         self._guard.count[0] = 0
 
-    def _begin_anew(self) -> None:
+    def _restart_controller(self) -> None:
         """The walker's new beginning, with the command that holds now."""
         orders = self._expect_orders("guard")
         now = orders.copy()
-        super()._begin_anew()
+        super()._restart_controller()
         orders[:] = now
 
     def _stepping(self, bound: PolicyStep) -> CompiledStep:

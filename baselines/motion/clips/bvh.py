@@ -164,7 +164,7 @@ def _axes(
     raw: Skeleton, places: np.ndarray, turns: np.ndarray, unit: str, up: str, forward: str,
     source: str,
 ) -> FileAxes:  # fmt: skip
-    """Axes and unit as they are given, or as legs, hips and feet tell them."""
+    """Return axes and unit as given, or inferred from legs, hips and feet."""
     roles = raw.roles
     if "auto" in (unit, up, forward):
         missing = [role for role in LEGS if role not in roles]

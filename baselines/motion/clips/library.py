@@ -32,7 +32,7 @@ def captured_clips() -> dict[str, Path]:
 
 
 def known_clips() -> list[str]:
-    """Names of all clips that can be told by name, the packaged ones first."""
+    """Return the names of all known clips, the packaged ones first."""
     return list(dict.fromkeys([*packaged_clips(), *walking_clips(), *sorted(captured_clips())]))
 
 

@@ -101,7 +101,7 @@ def _without_common(words: list[list[str]], place: int) -> list[list[str]]:
 
 
 def _base(words: list[str]) -> tuple[str, str]:
-    """What is said besides the side: what follows it, or else what is before."""
+    """Return a name without its side: what follows it, or else what precedes it."""
     places = [i for i, word in enumerate(words) if word in LETTERS]
     if places and len(words) > 1:
         i = places[0]

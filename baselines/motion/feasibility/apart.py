@@ -28,8 +28,7 @@ def stretch_at(
     """The frames about one without a step between, and as a motion in place: what can be joined
     there. Of a clip without steps these are all.
 
-    Raises ConfigError where a sole is in the air, or both do not stand as in standing for four
-    frames.
+    Raises ConfigError where a foot swings, or both do not stand as in standing for four frames.
     """
     name, time = clip.about.name, f"{frame * clip.dt:.2f} s"
     if clip.planted is None:

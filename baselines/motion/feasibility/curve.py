@@ -1,5 +1,5 @@
-"""Joins as curves from one end to another, of the fifth order and bent by three knots, and what
-came of them."""
+"""Joins as curves from one end to another, of the fifth order and bent by three knots, and their
+feasibility."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class End(NamedTuple):
     q: np.ndarray
     boundary: Boundary
     region: np.ndarray  # (k, 2) where the motors can bear the weight
-    own: Feasibility  # of the motion about the join, whether it is played or not
+    own: Feasibility  # of the motion about the join, whether it is used or not
 
     @property
     def is_calm(self) -> bool:

@@ -81,7 +81,7 @@ def _fit_steps(
     slowed: Sequence[tuple[float, RobotClip]], planted: np.ndarray, robot: Robot,
     limits: FeasibilityLimits | None,
 ) -> Fitted:  # fmt: skip
-    """The first tempo at which a motion with steps, or one with its CoM planned anew, holds."""
+    """Return the first feasible tempo of a motion with steps, or with its CoM replanned."""
     judged = check_motion(slowed[0][1], robot, limits)
     if judged.feasible:
         return Fitted(slowed[0][1], 1.0, 0.0, judged)

@@ -26,7 +26,7 @@ def split_wrench(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     unit, limit = robot.units.force, np.asarray(robot.torque_limit)
     G = wrench_sums(trajectory)
     B = unit * (trajectory.jacobians[:, :, robot.motor_dofs] / limit).transpose(0, 2, 1)
-    bears = np.repeat(trajectory.planted, 6, axis=1)  # a sole in the air bears nothing
+    bears = np.repeat(trajectory.planted, 6, axis=1)  # a swing foot bears nothing
     G, B = G * bears[:, None], B * bears[:, None]
     b, wanted = trajectory.motors / limit, trajectory.wrench / unit
     size = np.concatenate([np.append(np.ones(3), _lever(sole.polygon)) for sole in robot.soles])

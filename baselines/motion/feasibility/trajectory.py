@@ -76,8 +76,8 @@ class PlantedRobot:
     """A robot of which joints alone are known: its soles say where it is and how it moves.
 
     The middle of the soles is where it is in standing, level and facing forward. The root's
-    velocity is the one for which the soles rest, J_r v_r = −J_q q̇ in least squares; likewise
-    J_r v̇_r = −J_q q̈ − J̇ v.
+    velocity is the one for which the soles rest, J_r v_r = −J_q q̇ in least squares; its
+    acceleration is that of J_r v̇_r = −J_q q̈ − J̇ v.
     """
 
     def __init__(self, robot: Robot):

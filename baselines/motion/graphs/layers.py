@@ -66,8 +66,8 @@ class Layers:
                            f"{', '.join(reached[:20]) or 'nothing'}{said})")  # fmt: skip
 
     def _path(self, nodes: list[int], cost: float) -> Path:
-        """The path of all nodes from the begin to the end: those between which a clip is played on
-        are one step."""
+        """Return the path of all nodes from begin to end: nodes between which a clip continues are
+        one step."""
         groups, after = [[nodes[1]]], []
         for last, node in pairwise(nodes[1:-1]):
             transition = self._transition(last, node)

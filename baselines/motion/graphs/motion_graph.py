@@ -32,7 +32,7 @@ class Thresholds:
         angle: largest turn of a joint in it [deg].
         contacts: whether the same feet must be planted on both sides.
         least, most: durations [s].
-        time_price: λ, of a second of transition or of what nobody asked for, in units of K.
+        time_price: λ, of a second of transition or of clips not in the script, in units of K.
         apart: two transitions of a pair differ by this or more, in either clip [s].
         each: most transitions of a pair.
     """

@@ -14,10 +14,10 @@ class Task:
     """What a path must do.
 
     Attributes:
-        actions: names of the clips to be played, in this order.
+        actions: names of the clips, in this order.
         arrows: number of an action → the transition by hand that follows it.
         start: places where the path may begin, each with a cost; none for the first action's begin.
-        goal: likewise where it may end; none for the last action's end.
+        goal: places where it may end, each with a cost; none for the last action's end.
     """
 
     actions: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""The blocks that the kernels of this room work on; in SI units."""
+"""The blocks of this package's kernels; in SI units."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -40,7 +40,7 @@ class Performance(Block):
     clock: Number  # since the reset [s]
     performing: Integer  # 1 while it follows the schedule; 0: it catches itself
     begun: Integer  # the phase whose foot lifted off last; 0: none did
-    flying: Integer  # 1 while both feet are in the air
+    flying: Integer  # 1 during flight
     rested: Number  # since both feet are down and the motion is left [s]
     left: Integer  # how often the planner of steps took over
     frame: Annotated[np.ndarray, 5]  # see X to SIN

@@ -55,7 +55,7 @@ def may_go_on(t: PerformTick, time: float) -> bool:
 
 @compiled
 def go_on(t: PerformTick) -> None:
-    """Perform again, from the stance that the planner has led to."""
+    """Perform again, from the stance that the planner has reached."""
     c, p, m = t.capture, t.performance, t.own.memory
     before = c.standing.problem.workspace.tau if m.steps[0] == 0 else c.on_both.applied
     go_on_from(t.own.on_both, before)

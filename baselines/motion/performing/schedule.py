@@ -40,7 +40,7 @@ def next_switch(t: PerformTick, time: float) -> float:
 
 @compiled
 def lifted_foot(t: PerformTick, phase: int) -> int:
-    """The foot that is in the air in a phase; −1: none."""
+    """Return the swing foot of a phase; −1: none."""
     planted = t.performance.planted
     for foot in range(2):
         if planted[phase, foot] == 0:

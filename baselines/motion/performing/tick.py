@@ -1,6 +1,6 @@
 """A tick of `MotionStep` in a motion with steps; `perform_tick` is where to begin.
 
-While it performs, the soles in contact are those of the schedule, the foot in the air follows the
+While it performs, the soles in contact are those of the schedule, the swing foot follows the
 motion's, and the CoM c̈ = ω² (c − p − δ) with p = p_ref + (1 + k) (ξ − ξ_ref), kept within what the
 soles reach [Englsberger11]; δ is what the motion's angular momentum does. When p_ref + ξ − ξ_ref is
 beyond that, no CoP brings ξ back, and the planner of steps takes over. Once it has come to rest the
@@ -43,8 +43,8 @@ from .schedule import (
 )
 
 UNLOADED, LEAST_LOAD = 1.15, 0.03  # [m g] that a foot may bear when it begins to, and as it, leaves
-AIR, WEIGHTLESS = 30.0, 0.01  # [1/s] of soles in the air when both are; [m g] that they bear then
-LEAST_SHARE = 0.1  # of what soles in the air are asked for, that is tried
+AIR, WEIGHTLESS = 30.0, 0.01  # [1/s] of soles in flight; [m g] that they bear then
+LEAST_SHARE = 0.1  # of the acceleration asked of soles in flight, that is tried
 SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame is that of the soles
 
 
@@ -129,8 +129,8 @@ def follow_foot(t: PerformTick) -> None:
 
 @compiled
 def in_flight(t: PerformTick, phase: int, time: float) -> bool:
-    """Return whether both feet are in the air: from when the motion says so until a sole touches
-    the ground, late in the flight."""
+    """Return whether the robot is in flight: from the motion's take-off until a sole touches the
+    ground, late in the flight."""
     s, p = t.own.state, t.performance
     if flies(t, phase) and p.begun[0] != phase and not t.own.memory.swinging[0]:
         p.begun[0], p.flying[0] = phase, 1
@@ -145,8 +145,8 @@ def in_flight(t: PerformTick, phase: int, time: float) -> bool:
 
 @compiled
 def lead_soles(t: PerformTick, time: float, share: float) -> None:
-    """What the QP asks of soles in the air: the `share` of what leads them where the motion has
-    them that is not falling freely."""
+    """Set the accelerations of soles in flight: free fall and the `share` of what guides them to
+    the motion's."""
     c, p, s = t.own, t.performance, t.own.state
     problem = c.on_both.problem
     accel, damping = problem.workspace.sole_accel, problem.parameters.sole_damping
@@ -170,9 +170,9 @@ def lead_soles(t: PerformTick, time: float, share: float) -> None:
 
 @compiled
 def fly(t: PerformTick, time: float) -> None:
-    """A tick with both feet in the air: soles go where the motion has them, and bear nothing.
+    """A tick in flight: soles follow the motion, and bear nothing.
 
-    Where the motors cannot lead them so, they do as much of it as they can.
+    Where the motors cannot follow, a smaller share is asked.
     """
     c = t.own
     contacts = c.on_both

@@ -21,14 +21,14 @@ from .tracks import Tracks
 
 FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
 TOGETHER = 0.15  # [s] between two feet that leave the ground, or land, in one jump
-#: seconds in the air, and shares of the clip's way and turn, that are tried
+#: seconds of flight, and shares of the clip's way and turn, that are tried
 FLIGHTS = (0.34, 0.32, 0.28, 0.25, 0.22, 0.2, 0.15, 0.1)
 WAYS = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15, 0.0)
 STANDS = 0.5  # [s] on the ground between two jumps, at least
 PUSH = 0.3  # [s] of pushing off, and of landing, at most
 OFF_AT, DEEPEST = 0.965, 0.84  # [h] of the CoM at lift-off; deeper, flat feet bend ankles too far
 DEPTH = 0.38  # of v · push by which it goes down first
-SWIFTEST = 3.5  # [g] of soles in the air, sideways: faster, legs and their motors fall behind
+SWIFTEST = 3.5  # [g] of soles in flight, sideways: faster, legs and their motors fall behind
 LEAN = 0.3  # [rad] of the trunk, ahead, while it jumps: hips are behind and ankles bend less
 HEADING = 2  # of the entries of `_spots`
 CLEAR = 0.012  # [h] that soles rise more than the CoM does
@@ -45,7 +45,7 @@ class Leap(NamedTuple):
 def find_leaps(clip: Clip) -> list[Leap]:
     """The jumps with both feet of a clip, in order; none for one that walks or stands.
 
-    Raises ConfigError for one that runs: it has a foot in the air before it leaves the ground.
+    Raises ConfigError for one that runs: one foot swings before the flight.
     """
     planted = measure_contacts(clip).planted
     found = []
@@ -56,7 +56,7 @@ def find_leaps(clip: Clip) -> list[Leap]:
         around = round(TOGETHER / clip.dt)
         before, after = planted[max(a - around, 0) : a], planted[b : b + around]
         if a == 0 or b == len(planted):
-            raise ConfigError("is in the air at its begin or end", source=clip.name,
+            raise ConfigError("begins or ends in flight", source=clip.name,
                               field="contacts")  # fmt: skip
         if not (before.any(axis=0).all() and after.any(axis=0).all()):
             raise ConfigError(
@@ -90,7 +90,7 @@ def plan_leaps(
         qpos: (F, nq) in its frames, at `RATE`.
         robot: with two feet.
         lead: frames at `RATE` from standing into the clip, and back.
-        flight: time in the air [s].
+        flight: its duration [s].
         way: share of the clip's ways and turns.
 
     Raises ConfigError where soles would have to move faster than legs can.

@@ -27,7 +27,7 @@ EARLY = 0.2  # [s] by which a sole lifts off before the toes of the clip do, who
 SWING = 0.4  # [s] of a step whose begin or end the clip does not show
 FLIGHT = 0.07  # [s] with both feet off the ground: longer is a run or a jump
 LOWEST, HIGHEST = 0.05, 0.15  # [h] of the way of a foot over the ground at its highest
-DIP, MOST_DIP = 0.5, 0.35  # of its height that a foot's toes dip in the air; the turn [rad]
+DIP, MOST_DIP = 0.5, 0.35  # of its height that a foot's toes dip in swing; the turn [rad]
 LEANING = 1.0  # [Hz] of the low-pass on what the trunk leans: faster, the ZMP cannot be borne
 SWINGING = 1.5  # [Hz] of that on trunk and arms
 MARGIN = 0.005  # [rad] that these keep from their limits
@@ -181,8 +181,8 @@ def _goals(
 def led(
     values: np.ndarray, first: np.ndarray, last: np.ndarray, lead: int, begin: int, frames: int
 ) -> np.ndarray:
-    """Values (F, m) of a clip that begins in a frame, led from `first` and to `last` (m,) in `lead`
-    frames, which are held."""
+    """Return values (F, m) of a clip that begins in a frame, blended from `first` and to `last`
+    (m,) in `lead` frames, which are held."""
     way = ease(np.arange(lead)[:, None] / lead)
     into, back = first + way * (values[0] - first), last + way[::-1] * (values[-1] - last)
     before, after = begin - lead, frames - begin - len(values) - lead
@@ -191,8 +191,8 @@ def led(
 
 
 def calm_joints(robot: Robot, qpos: np.ndarray, lead: int, begin: int, frames: int) -> np.ndarray:
-    """(F, nj) joints of a clip's postures, low-passed and within their limits, led from and to
-    standing."""
+    """Return joints (F, nj) of a clip's postures, low-pass filtered and within their limits,
+    blended from and to standing."""
     standing, (least, most) = robot.standing_qpos[7:], (robot.joint_range + [MARGIN, -MARGIN]).T
     calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
     return led(calm, standing, standing, lead, begin, frames)

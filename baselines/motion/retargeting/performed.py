@@ -70,7 +70,7 @@ def load_clip(file: str | Path, robot: Robot | None = None) -> tuple[Clip, str]:
 
 
 def clip_with_support(made: RobotClip, robot: Robot, name: str) -> Clip:
-    """A robot's motion as a clip, which knows its contacts if it has steps."""
+    """Return a robot's motion as a clip, with contacts if it has steps."""
     whole = clip_of_robot(robot, made.qpos, made.dt, name)
     support = None
     if made.planted is not None:
@@ -92,7 +92,7 @@ def planted_qpos(clip: Clip, robot: Robot) -> np.ndarray:
 def robot_clip_of(clip: Clip, robot: Robot, name: str, source: str = "") -> RobotClip:
     """A clip of the robot's skeleton as its motion: from standing to standing, on planted soles.
 
-    Soles that a clip with steps has in the air stay there; see `at_rest` for the others.
+    Swings of a clip with steps are kept; see `at_rest` for the other soles.
 
     Raises:
         ConfigError: a clip of another skeleton, or a posture that the robot cannot follow.

@@ -48,7 +48,7 @@ class Retargeted(NamedTuple):
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
-        flight: share of the time that the clip is in the air.
+        flight: share of the time that the clip is in flight.
         bound: what keeps it from 0.7 of the clip's speed; empty where nothing does.
     """
 
@@ -128,7 +128,7 @@ def _retargeted(
 
 
 def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted: bool) -> AskedOf:
-    """What a clip asks of a robot; arguments and errors as of `retarget`."""
+    """Return the targets of a clip on a robot; arguments and errors as of `retarget`."""
     for name, value in (("smooth", smooth), ("lead", lead)):
         if not 0.0 < value <= 100.0:
             raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)
@@ -220,7 +220,7 @@ def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Reta
     Args:
         clip: of any skeleton whose hips, knees and ankles are known.
         robot: with two feet.
-        smooth: half the low-pass on what is asked for [Hz].
+        smooth: half the cut-off of the low-pass on the targets [Hz].
 
     Raises:
         ConfigError: unknown joints, fewer than 8 frames, mink is missing.

@@ -16,13 +16,13 @@ from .tasks import PointTask
 from .tracks import Tracks
 
 PELVIS = 5.0  # cost of its place [1/m]
-SWING, LEVEL = 30.0, 1.0  # costs of a sole in the air: place [1/m] and turn [1/rad]
+SWING, LEVEL = 30.0, 1.0  # costs of a swing foot's sole: position [1/m] and rotation [1/rad]
 ROOT, LEAN = 10.0, 3.0  # the same of the root where the filtered postures are made to stand
 
 
 def solve_tracks(robot: Robot, limbs: Limbs, tracks: Tracks, cutoff: float) -> Solved:
-    """One posture after the other, as `solve_frames`: planted soles are constraints, those in the
-    air and the pelvis are tasks. All is low-passed at `cutoff` [Hz], and the nearest postures with
+    """Solve one posture after the other, as `solve_frames`: planted soles are constraints, swing
+    feet and the pelvis are tasks. All is low-passed at `cutoff` [Hz], and the nearest postures with
     planted soles are what remains. Raises PoiseError if a QP has no solution."""
     return _TrackIk(robot, limbs, tracks).solve_all(tracks.body, cutoff)
 

@@ -1,4 +1,4 @@
-"""What a clip asks of any body: directions of its segments and the height of its pelvis."""
+"""Targets of a clip for any body: directions of its segments and the height of its pelvis."""
 
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ LINES = {
     **{f"forearm_{s}": (f"elbow_{s}", f"hand_{s}", 1.0) for s in SIDES},
 }
 ARMS = ("shoulders", *(f"{part}_{side}" for part in ("upper_arm", "forearm") for side in SIDES))
-UPRIGHT = 0.9  # of the legs' length: at least so high are the hips of somebody who stands
+UPRIGHT = 0.9  # of the legs' length: least height of the hips of a person who stands
 FEW = 8  # frames: a shorter clip cannot be smoothed
 
 
@@ -48,7 +48,7 @@ def clip_targets(
     """Targets of a clip at 30 frames a second, low-passed at `smooth` [Hz] both ways in time.
 
     The `heading` [rad], or the feet's mean direction at the start, becomes x. Heights are relative
-    to the highest of the clip, or to 0.9 of the legs' length where nobody stands upright in it: so
+    to the highest of the clip, or to 0.9 of the legs' length where it has no upright posture: so
     they are scaled by the lengths of the legs. Directions are of points, so T and A as rest poses
     make no difference.
 

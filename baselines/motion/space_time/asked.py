@@ -17,7 +17,7 @@ ENDLESS = np.array([np.inf])
 class Asked:
     """Errors of the tasks of single frames, and rows of what a body must not do.
 
-    What a user wants to touch may: links of such a pair keep a distance of 0 in its period.
+    Links that a user asks to touch may: their pair keeps a distance of 0 in its period.
     """
 
     def __init__(self, scene: Scene, targets: BodyTargets, constraints: Sequence[Constraint]):

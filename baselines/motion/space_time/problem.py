@@ -126,7 +126,7 @@ def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = No
     """Move the postures of the problem's scene to a minimum of its cost.
 
     Each program gives displacements; the largest of their shares 1, ½, ¼ and 0.1 is taken that
-    lowers the cost once the soles have been led to their places. The trust region shrinks by half
+    lowers the cost once the soles are projected to their places. The trust region shrinks by half
     where less than the whole was good, and doubles otherwise.
 
     Raises PoiseError if OSQP breaks down in the first program.

@@ -56,8 +56,8 @@ class RetargetedClip(NamedTuple):
         tempo: how many times as fast as the clip it is.
         walker: the packaged controller or policy that performs it by walking; empty where none is
             needed.
-        asked: how many times the clip's speed at that tempo the walker is told, since it is slower.
-        flight: share of the time that the clip is in the air.
+        asked: commanded speed over the clip's at that tempo, since the walker is slower.
+        flight: share of the time that the clip is in flight.
         bound: as of `Retargeted`.
     """
 
@@ -114,21 +114,21 @@ def retarget_clip(
             reason = _climb(clip) or error.message
             if asked or error.field not in UNPERFORMED:
                 raise
-    free, tempo, walker, told = retarget_freely(clip, robot, smooth=smooth), 1.0, "", 1.0
+    free, tempo, walker, factor = retarget_freely(clip, robot, smooth=smooth), 1.0, "", 1.0
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
             commands, tempo, name, more = find_commands(clip, robot, free.scale, ENOUGH)
             walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
             reference_from(walks, robot, clip.name)
-            seen, walker, told = walks, name, more
+            seen, walker, factor = walks, name, more
         except ConfigError as error:
             if error.field == "speed":
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
     made = _stepped(free._replace(clip=seen), scene)
     stride = 1.0 if walker else made.stride
-    return made._replace(tempo=tempo, walker=walker, stride=stride, asked=told)
+    return made._replace(tempo=tempo, walker=walker, stride=stride, asked=factor)
 
 
 def _climb(clip: Clip) -> str:
@@ -173,7 +173,7 @@ def performable(
         smooth: low-pass on what the clip asks for [Hz].
         lead: time from standing into the clip, and back [s].
         planted: take the feet as planted though they move in the clip.
-        progress: is told a line after every quadratic program.
+        progress: called with a line after every quadratic program.
 
     Raises:
         ConfigError: as `retarget`; a constraint of a point that the robot lacks, or a time that the
@@ -222,7 +222,7 @@ def performable(
 
 
 def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
-    """A clip with steps, whose frames are not those of what was asked for: hands are left out."""
+    """Return a clip with steps, whose frames differ from the targets': hands are left out."""
     from .quality import measure_soles
 
     quality = measure_soles(scene, made.penetration, made.limit_excess, made.direction_error)

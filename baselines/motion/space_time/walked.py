@@ -1,4 +1,4 @@
-"""What a planner of steps is told so that a robot walks and turns as a clip does."""
+"""Commands of a step planner by which a robot walks and turns as a clip does."""
 
 from typing import NamedTuple
 
@@ -18,12 +18,12 @@ TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
-REACHES = 0.47  # [hω] that `walk-fast` gets to, whatever it is told
-ASKED = 1.06  # times a clip's speed is told to the policy at most, which is slower than told
+REACHES = 0.47  # [hω] that `walk-fast` reaches, whatever the command
+ASKED = 1.06  # largest commanded speed over the clip's: the policy is slower than commanded
 FAST_ROBOTS = ("humanoid",)  # for which the others are; others fall
 BANK, LEARNED_BANK = 0.07, 0.0875  # [g] of speed times turning rate, above which robots fall
-ASKED_BANK = 0.091  # [g] that it is told in curves at most: it goes slower than it is told
-ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, that the policy knows
+ASKED_BANK = 0.091  # [g] commanded in curves at most: it goes slower than commanded
+ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, of the policy's training
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
@@ -34,7 +34,7 @@ BOTH = 0.13  # [1/ω] that planners stand on both feet between two swings
 
 class Walked(NamedTuple):
     """Commands (n, 5) in the clip's time, how many times as fast as the clip that is, the packaged
-    controller or policy that walks so, and how many times that speed it is told, being slower."""
+    controller or policy that walks so, and its commanded speed over that speed, as it is slower."""
 
     commands: np.ndarray
     tempo: float

@@ -1,4 +1,4 @@
-"""What a script wants played, in order: brackets and names of its own resolved, overlays made."""
+"""A script's actions, in order: brackets and names of its own resolved, overlays made."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -171,7 +171,7 @@ def state_of(overlay: Overlay) -> StateName | None:
 
 
 def _repeats(term: Term) -> tuple[int, tuple[Modifier, ...]]:
-    """How often a term is played, and its other modifiers."""
+    """Return how often a term is repeated, and its other modifiers."""
     times = 1
     for modifier in term.modifiers:
         if modifier.kind == "*":

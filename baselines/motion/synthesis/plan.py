@@ -1,4 +1,4 @@
-"""What a script is to play, and what is played."""
+"""The plan of a script, and the parts of its motion."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,8 +12,8 @@ PHYSICAL = "physical"  # the kind of transitions that a robot's abilities decide
 
 
 @dataclass(frozen=True)
-class Played:
-    """A clip, or a transition, as it is played.
+class MotionPart:
+    """A clip, or a transition, in a motion.
 
     Attributes:
         what: name of the clip, or the kind of the transition.
@@ -21,7 +21,7 @@ class Played:
         enter, leave: times in the clip [s]; of a transition those of the clips about it.
         wanted: whether the script asks for it.
         coefficient: K of a transition; None for a clip.
-        physics: of a physical transition what `Way.record` tells; None for others.
+        physics: of a physical transition `Way.record`; None for others.
     """
 
     what: str
@@ -49,7 +49,7 @@ class Plan:
     kinds: dict[int, str]
 
 
-def played_lead(way: Way, begins: float) -> Played:
-    """The record of a way from or to standing."""
+def lead_part(way: Way, begins: float) -> MotionPart:
+    """Return the part of a way from or to standing."""
     ends = begins + way.clip.duration
-    return Played(PHYSICAL, begins, ends, 0.0, 0.0, False, None, way.record())
+    return MotionPart(PHYSICAL, begins, ends, 0.0, 0.0, False, None, way.record())

@@ -45,7 +45,7 @@ class Way:
     parts: tuple[JoinPart, ...]
 
     def record(self) -> dict[str, Any]:
-        """What is told of it, as plain values: durations [s], ZMP [m], torque over its limit."""
+        """Return its figures, as plain values: durations [s], ZMP [m], torque over its limit."""
         judged = [part.feasibility for part in self.parts]
         return {
             "durations": [part.duration for part in self.parts],
@@ -206,7 +206,7 @@ class RobotJoins:
 
 
 def _end(shaper: Shaper, side: _Side, time: float, entered: bool) -> End:
-    """The end of a side at a time [s], with the frames that are played next to it."""
+    """Return the end of a side at a time [s], with the frames next to it."""
     time, steps = max(time - side.begin, 0.0), np.arange(NEIGHBOURS) * shaper.dt
     times = time + steps if entered else time - steps[::-1]
     kept = times[(times > -1e-9) & (times < side.motion.duration + 1e-9)]

@@ -22,7 +22,7 @@ class Stage:
 
     Attributes:
         graph: with a node for every clip.
-        clips: name → clip; `frames` likewise.
+        clips, frames: name → clip; name → its frames.
         derived: the clips that scripts made, named by their text.
         others: clips that there are, too, and that are not loaded.
     """

@@ -23,7 +23,7 @@ from poise.baselines.motion.synthesis.scripts.tree import Script, StateName
 from poise.configs.errors import ConfigError, shown
 
 from .actions import Actions, Reader
-from .plan import PHYSICAL, Plan, Played, played_lead
+from .plan import PHYSICAL, MotionPart, Plan, lead_part
 from .robot_joins import RobotJoins
 from .stage import LONGEST, Stage
 
@@ -72,16 +72,16 @@ class Synthesis:
     def make(self, script: Script, plan: Plan | None = None) -> tuple[Clip, dict[str, Any]]:
         """The clip of the best path, and the record of what was chosen, as plain values."""
         plan = self.plan(script) if plan is None else plan
-        clip, played = self._play(plan)
+        clip, parts = self._play(plan)
         if self.kind == PHYSICAL:
-            clip, played = self._led(clip, played)
+            clip, parts = self._led(clip, parts)
         return clip, {
             "script": text_of(script),
             "robot": self.stage.graph.robot,
             "duration": clip.duration,
             "cost": plan.paths[0].cost,
             "made": sorted(self.stage.derived),
-            "played": [asdict(part) for part in played],
+            "played": [asdict(part) for part in parts],
             "others": [{"cost": path.cost, "clips": [step.clip for step in path.steps]}
                        for path in plan.paths[1:]],
         }  # fmt: skip
@@ -115,8 +115,8 @@ class Synthesis:
             if clip.support is None or joins is None:
                 continue
             if len(actions.names) > 1 and self.kind != PHYSICAL:
-                raise ConfigError(f"{shown(name)} has steps, which {self.kind} does not know: only "
-                                  f"{PHYSICAL} joins it", source=script.source)  # fmt: skip
+                raise ConfigError(f"{shown(name)} has steps, which {self.kind} does not support: "
+                                  f"only {PHYSICAL} joins it", source=script.source)  # fmt: skip
             for first, needed in ((True, i > 0), (False, i + 1 < len(actions.names))):
                 times = clip.times[clip.support.home]
                 late, early = latest_part(clip.duration), earliest_part(clip.duration)
@@ -175,14 +175,14 @@ class Synthesis:
             return nearest_places(self.stage.frames, posture,
                                   price=self.stage.graph.thresholds.time_price)  # fmt: skip
 
-    def _play(self, plan: Plan) -> tuple[Clip, list[Played]]:
+    def _play(self, plan: Plan) -> tuple[Clip, list[MotionPart]]:
         """The steps of the best path, one after the other."""
         steps = plan.paths[0].steps
         seconds = sum(s.leave - s.enter + (s.after.duration if s.after else 0.0) for s in steps)
         if seconds > 2.0 * LONGEST:  # joins that overlap take time away, at most half
             raise self._too_long()
         last, done = self._part(steps[0]), list[Clip]()
-        played = [Played(steps[0].clip, 0.0, last.duration, *steps[0][1:4])]
+        parts = [MotionPart(steps[0].clip, 0.0, last.duration, *steps[0][1:4])]
         number, kind, frames = 0 if steps[0].wanted else -1, self.kind, 0
         for before, step in pairwise(steps):
             transition, part = before.after, self._part(step)
@@ -195,16 +195,16 @@ class Synthesis:
             done.append(head)
             frames += len(head)
             begins = frames * last.dt
-            ends = sorted((played[-1].ends, begins))
-            played += [
-                Played(kind, ends[0], ends[1], transition.leave, transition.enter, False,
+            ends = sorted((parts[-1].ends, begins))
+            parts += [
+                MotionPart(kind, ends[0], ends[1], transition.leave, transition.enter, False,
                        transition.coefficient, physics),
-                Played(step.clip, begins, begins + part.duration, *step[1:4]),
+                MotionPart(step.clip, begins, begins + part.duration, *step[1:4]),
             ]  # fmt: skip
         whole = together([*done, last])
         if whole.duration > LONGEST:
             raise self._too_long()
-        return replace(whole, name=plan.actions.names[0]), played
+        return replace(whole, name=plan.actions.names[0]), parts
 
     def _joined(
         self, kind: str, last: Clip, part: Clip, transition: Transition
@@ -219,19 +219,19 @@ class Synthesis:
                          for clip in (way.clip, part))  # fmt: skip
         return laid_on(laid_on(last, between), part), way.record()
 
-    def _led(self, clip: Clip, played: list[Played]) -> tuple[Clip, list[Played]]:
+    def _led(self, clip: Clip, parts: list[MotionPart]) -> tuple[Clip, list[MotionPart]]:
         """From standing to standing, by ways that the robot can do."""
         assert self.robot_joins is not None
         into, back = (self.robot_joins.lead(clip, first) for first in (True, False))
         if into is not None:
             clip = replace(laid_on(into.clip, clip), name=clip.name, licence=clip.licence)
             late = into.clip.duration
-            played = [replace(p, begins=p.begins + late, ends=p.ends + late) for p in played]
-            played = [played_lead(into, 0.0), *played]
+            parts = [replace(p, begins=p.begins + late, ends=p.ends + late) for p in parts]
+            parts = [lead_part(into, 0.0), *parts]
         if back is not None:
-            played = [*played, played_lead(back, clip.duration)]
+            parts = [*parts, lead_part(back, clip.duration)]
             clip = laid_on(clip, back.clip)
-        return clip, played
+        return clip, parts
 
     def _too_long(self) -> ConfigError:
         return ConfigError(f"lasts longer than {LONGEST:g} s", source="script")

@@ -30,7 +30,7 @@ class Frames(NamedTuple):
     root: np.ndarray  # (T, 3) [m]
     quat: np.ndarray  # (T, 4) wxyz
     joints: np.ndarray  # (T, n) [rad]
-    velocities: np.ndarray | None  # (T, n) [rad/s]; None: not told
+    velocities: np.ndarray | None  # (T, n) [rad/s]; None: not in the file
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ class MotionConfig:
         heading: what of the first frame is turned to face as the robot's anchor does: the anchor
             or the root.
         rate: of a .csv file [Hz]; 0: 30.
-        plays: whether the clip is played from a trial's begin on; else its first frame is held.
+        plays: whether the clip runs from a trial's begin on; else its first frame is held.
     """
 
     clip: str = ""

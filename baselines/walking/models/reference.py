@@ -1,4 +1,4 @@
-"""The interface of reference models: what they are told in a tick, and what they answer.
+"""The interface of reference models: their inputs and outputs of a tick.
 
 All models share the horizontal balance of `dcm.py`. A model says how high the hip of a leg that
 bears the robot is over its ankle, from the horizontal way of the CoM. On both feet the heights of
@@ -28,7 +28,7 @@ from .legs import LegArrays
 
 @dataclass(frozen=True, eq=False)
 class Reference(Block):
-    """What a model is told, and what it answers; legs in the order of the soles."""
+    """Inputs and outputs of a model; legs in the order of the soles."""
 
     legs: LegArrays
     gravity: float  # g [m/s²]
@@ -53,7 +53,7 @@ class ReferenceModel(OfKind):
     """Base of the models. A subclass is a frozen dataclass of numbers, with a `kind`.
 
     `bind` makes the program that fills `Reference.height` in a tick, and `knee` and `hip` where the
-    model has rows in the QP, from what the walk has told.
+    model has rows in the QP, from the inputs that the walk has set.
     """
 
     room: ClassVar[str] = str(__package__)

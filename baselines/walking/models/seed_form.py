@@ -2,7 +2,7 @@
 
     θ(t) = A1 e^{λt} + A2 e^{−λt},   φ(t) = B1 e^{λt} + B2 e^{−λt} + C1 t + C2       (6)
 
-It is the solution of θ̈ = λ² θ, φ̈ = K θ, with B = K A/λ²: so much can be told of the equations (4)
+It is the solution of θ̈ = λ² θ, φ̈ = K θ, with B = K A/λ²: so much follows of the equations (4)
 and (5), which the print has lost. The A and C are those of the angles and rates now. λ and K lead
 to the angles θ₀, φ₀ of the wanted foothold at T, the least squares (7), which two unknowns solve
 exactly where they can:

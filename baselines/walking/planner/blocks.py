@@ -88,7 +88,7 @@ class WalkTick(Block):
     capture: CaptureTick  # while it stands, and catches falls from there
     walk: CaptureTick  # the same memory, with the QPs, the swing and the limits of the gait
     gait: Gait
-    reference: Reference  # what the model of the gait is told, and what it answers
+    reference: Reference  # inputs and outputs of the gait's model
     model: Program  # its kernel
     arms: Arms
     constant_height: int  # 1: the gait's own height holds, and no model is asked

@@ -75,11 +75,11 @@ class GaitCommand:
 def command_of(array: np.ndarray) -> GaitCommand:
     """The command that `GaitCommand.array` gives as (8,)."""
     ahead, left, turn, *own = (float(value) for value in array)
-    told = {name: value or None for name, value in zip(STEP_PARAMETERS, own, strict=True)}
-    return GaitCommand(ahead, left, turn, **told)
+    steps = {name: value or None for name, value in zip(STEP_PARAMETERS, own, strict=True)}
+    return GaitCommand(ahead, left, turn, **steps)
 
 
-#: of a command, besides its velocity and turn
+#: of a command, in addition to its velocity and turn
 STEP_PARAMETERS = ("step_time", "width", "clearance", "arm_swing", "step_length")
 ENTRIES = COMMAND_ENTRIES  #: of the array of a command
 STEP_TIME, WIDTH, CLEARANCE, ARM_SWING, STEP_LENGTH = range(3, ENTRIES)  #: of its entries

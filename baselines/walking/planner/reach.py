@@ -22,16 +22,16 @@ ROUNDING = 1e-9  # [m] of a width that a user reads and gives back
 
 Pair = tuple[float, float]  # least and most
 #: pairs of a `Reach`
-TOLD = ("ahead", "left", "turn", "width", "clearance", "step_length", "arm_swing")
+COMMANDED = ("ahead", "left", "turn", "width", "clearance", "step_length", "arm_swing")
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What a robot can be told with a gait, each for itself: pairs of the least and the most.
+    """Ranges of a gait's commands on a robot, each for itself: pairs of the least and the most.
 
     Attributes:
         ahead, left: in steps of the gait's own time and width [m/s].
-        turn: likewise, in place [rad/s].
+        turn: in place [rad/s].
         width, step_length: see `GaitCommand` [m].
         clearance: in the longest swing that the planner takes [m].
         arm_swing: [rad]; 0 at most for a robot that does not say which joints swing its arms.
@@ -128,7 +128,9 @@ def shared_reach(reaches: Sequence[Reach | None]) -> Reach | None:
     known = [each for each in reaches if each is not None]
     if not known or len(known) < len(reaches):
         return None
-    pairs: dict[str, list[Pair]] = {name: [getattr(each, name) for each in known] for name in TOLD}
+    pairs: dict[str, list[Pair]] = {
+        name: [getattr(each, name) for each in known] for name in COMMANDED
+    }
     shared: dict[str, Any] = {
         name: (max(low for low, _ in each), min(high for _, high in each))
         for name, each in pairs.items()
@@ -216,7 +218,7 @@ def _check_clearance(
     needed = swing_time(robot, swing, command.clearance)
     if needed > time:
         raise _out_of_reach("clearance", f"{command.clearance:g} m in {time:.3g} s", robot,
-                            f"that in {needed:.3g} s, see step_time")  # fmt: skip
+                            f"it in {needed:.3g} s or more, see step_time")  # fmt: skip
 
 
 def _check_arms(command: GaitCommand, robot: Robot) -> None:
@@ -232,5 +234,5 @@ def _check_arms(command: GaitCommand, robot: Robot) -> None:
 
 
 def _out_of_reach(name: str, what: str, robot: Robot, limits: str) -> ConfigError:
-    return ConfigError(f"{what} is out of reach: {robot.name!r} can {limits}",
+    return ConfigError(f"{what} is out of range: {robot.name!r} supports {limits}",
                        field=f"command.{name}")  # fmt: skip

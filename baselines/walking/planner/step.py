@@ -34,7 +34,7 @@ from .command import MOST_STEP_TIME, STEP_LENGTH, STEP_TIME, WIDTH
 from .dcm import constant_cop, gait_offset, step_to_offset, touchdown_target, transfer_factor
 from .treads import advance_over_edges, apex_of_step, follow_line, footholds_given, settle_on_tread
 
-ROOM = 0.01  # [m] between the soles of a step to the side, besides the least width
+ROOM = 0.01  # [m] between the soles of a step to the side, in addition to the least width
 TIMES = 8  # step times that are weighed against the planned one
 LEAST_TIME = 0.06  # [s] for which the CoP on one foot is planned at least
 

@@ -56,8 +56,8 @@ default), clip_action. Fields may be plain mappings. Raises ConfigError naming w
 def filled(doc: str | None, terms: Terms) -> str | None:
     """A class docstring with its marks, such as <rewards> on a line alone, replaced.
 
-    The tables are made of the environment's `terms` and of `RewardWeights`, so that a new term is
-    told of without further ado.
+    The tables are made from the environment's `terms` and from `RewardWeights`, so that a new term
+    is documented without an edit here.
     """
     if doc is None:  # python -OO
         return None

@@ -54,8 +54,8 @@ def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
 class View(Block):
     """The block of a term: what its kernel reads, and the part of the observation that it fills."""
 
-    robot: RobotArrays  # the robot that is believed in
-    state: StateArrays  # the believed state
+    robot: RobotArrays  # nominal model
+    state: StateArrays  # the estimated state
     scales: Scales
     q_ref: np.ndarray  # (nj,) joint positions of the reference [rad]
     v_ref: np.ndarray  # (nj,) its joint velocities [rad/s]

@@ -247,7 +247,7 @@ class RewardWeights:
     )  # fmt: skip
     slip: float = _term(
         0.0, slip_cost,
-        "−mean min((ṗ_xy / 0.2 ω h)², 1) of the soles, 0 of those in the air", NO_DIVERGENCE,
+        "−mean min((ṗ_xy / 0.2 ω h)², 1) of the soles, 0 of swing feet", NO_DIVERGENCE,
     )  # fmt: skip
     tracking: float = _term(
         0.0, command_followed,

@@ -96,7 +96,7 @@ BAD_STATE = tuple(
 
 @compiled
 def has_diverged(views: SimViews) -> bool:
-    """True if numbers became too large since the reset; MuJoCo then starts anew by itself."""
+    """Return whether the state diverged since the reset; MuJoCo then resets by itself."""
     for i in BAD_STATE:
         if views.warnings[i] > 0:
             return True

@@ -163,7 +163,7 @@ MEASURED_TERMS = Terms(view=MeasuredView)  #: by name
 
 
 @MEASURED_TERMS.add(
-    SPACE, "1", "direction of gravity that the IMU tells, its axes", "root vector", default=False
+    SPACE, "1", "direction of gravity by the IMU, its axes", "root vector", default=False
 )
 def measured_gravity(m: MeasuredView):
     row = arrived(m.rings, m.late[0])
@@ -172,7 +172,7 @@ def measured_gravity(m: MeasuredView):
         m.seen.out[a] = -up
 
 
-@MEASURED_TERMS.add(SPACE, "ω", "angular velocity that the gyro tells", "root turn", default=False)
+@MEASURED_TERMS.add(SPACE, "ω", "angular velocity by the gyro", "root turn", default=False)
 def measured_rate(m: MeasuredView):
     row = arrived(m.rings, m.late[0])
     for a in range(3):
@@ -181,7 +181,7 @@ def measured_rate(m: MeasuredView):
 
 
 @MEASURED_TERMS.add(
-    "joints", "rad", "joint position that the encoder tells, minus the reference", "joints",
+    "joints", "rad", "joint position by the encoder, minus the reference", "joints",
     default=False,
 )  # fmt: skip
 def measured_joint_pos(m: MeasuredView):
@@ -191,7 +191,7 @@ def measured_joint_pos(m: MeasuredView):
 
 
 @MEASURED_TERMS.add(
-    "joints", "3 ω", "joint velocity that the encoder tells, minus the reference's", "joints",
+    "joints", "3 ω", "joint velocity by the encoder, minus the reference's", "joints",
     default=False,
 )  # fmt: skip
 def measured_joint_vel(m: MeasuredView):

@@ -121,23 +121,23 @@ class EnvBatch(Copyable):
     def advance(self, actions: np.ndarray, restart: np.ndarray | None = None) -> None:
         """Take a policy step of all but those of `restart` (n,), which start an episode instead.
 
-        The action of a restarted environment is not looked at; its reward is 0. Nothing else is
-        reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
-        Raises what one of the controllers raised, after all have played.
+        The action of a restarted environment is ignored; its reward is 0. Nothing else is reset.
+        Raises ConfigError for invalid actions (n, na), before any environment steps. An error of a
+        controller is raised after all environments have stepped.
         """
         record, everyone = self.episodes, range(len(self.envs))
-        played: Sequence[int] = everyone
+        stepped: Sequence[int] = everyone
         restarted: list[int] = []
-        # rows that are played: nearly always all, and a slice is cheap
+        # rows that are stepped: nearly always all, and a slice is cheap
         live: np.ndarray | slice = slice(None)
         if restart is not None and restart.any():
             live, restarted = ~restart, np.flatnonzero(restart).tolist()
-            played = np.flatnonzero(live).tolist()
+            stepped = np.flatnonzero(live).tolist()
         if not record.running[live].all():
             for env in np.array(self.envs, dtype=object)[live]:
                 env.expect_running()  # raises
         self._set_actions(actions, live)
-        turns = self._compiled_steps(played)
+        turns = self._compiled_steps(stepped)
         if turns is not None and restarted:
             self._share(self._restart, restarted, turns)
         elif turns is not None:
@@ -148,7 +148,7 @@ class EnvBatch(Copyable):
                 lambda i: self._restart(i) if i in again else self.envs[i].advance(), everyone
             )
         self._report()
-        for i in played if turns is not None else ():
+        for i in stepped if turns is not None else ():
             self.envs[i].check()
 
     def _report(self) -> None:
@@ -159,11 +159,11 @@ class EnvBatch(Copyable):
         self.terminated = record.metrics[:, TERMINATED] != 0.0
         self.truncated = (record.running[:, 0] == 0) & ~self.terminated
 
-    def _compiled_steps(self, played: Sequence[int]) -> StepSchedule | None:
-        """StepSchedule at the steps of `played`; None if Python has to take them."""
-        steps = [self.envs[i].compiled_step() for i in played]
+    def _compiled_steps(self, stepped: Sequence[int]) -> StepSchedule | None:
+        """Return the schedule of the steps of `stepped`; None if Python has to take them."""
+        steps = [self.envs[i].compiled_step() for i in stepped]
         known, turns = self._turns
-        if steps == known:  # the same objects, as long as nobody was bound anew
+        if steps == known:  # the same objects, as long as none was bound again
             return turns
         found = [step for step in steps if step is not None]
         if len(found) < len(steps):

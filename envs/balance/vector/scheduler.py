@@ -40,9 +40,9 @@ class StepSchedule:
         self.turns = np.zeros(threads, dtype=np.int64)  # next of each queue
         self.done = np.zeros(split, dtype=np.int64)  # ticks of the steps that are split
         self.taken = np.zeros(split, dtype=np.int64)  # 1 while a thread plays one of their ticks
-        # of each helper, in a line of its own: AWAY, WAITING or CALLED; 1 once it has played
+        # of each helper, in a line of its own: AWAY, WAITING or CALLED; 1 once it has finished
         self.calls = np.zeros(LINE * threads, dtype=np.int64)
-        self.played = np.zeros(LINE * threads, dtype=np.int64)
+        self.finished = np.zeros(LINE * threads, dtype=np.int64)
         self._process = os.getpid()  # that the threads are of
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -51,7 +51,7 @@ class StepSchedule:
         return StepSchedule, (NOTHING, len(self.turns))
 
     def begin(self) -> None:
-        """Have all steps played once more; in a forked process nobody plays or waits yet."""
+        """Run all steps once more; in a forked process no helper runs or waits yet."""
         if self._process != os.getpid():
             self._process = os.getpid()
             self.calls[:] = AWAY
@@ -68,13 +68,13 @@ class StepSchedule:
         self.begin()
         called = range(1, min(len(self.turns), len(self.steps)))
         for thread in called:
-            if not call_waiting(self.calls, self.played, thread):
+            if not call_waiting(self.calls, self.finished, thread):
                 helpers.ask(self._stay, thread)
         try:
             self.play(0)
         finally:
             for thread in called:
-                while not has_played(self.played, thread):
+                while not has_finished(self.finished, thread):
                     helpers.expect_alive()
                     time.sleep(0.0)  # its turn, if there are fewer cores than threads
 
@@ -82,7 +82,7 @@ class StepSchedule:
         """A helper's part of this call, and of those that follow soon enough."""
         stay(
             self.steps, self.ends, self.turns, self.done, self.taken, thread,
-            self.calls, self.played,
+            self.calls, self.finished,
         )  # fmt: skip
 
 
@@ -117,17 +117,17 @@ def play(
 
 
 @compiled
-def call_waiting(calls: np.ndarray, played: np.ndarray, thread: int):
+def call_waiting(calls: np.ndarray, finished: np.ndarray, thread: int):
     """Call a helper; False if it is away, and has to be woken."""
-    swap(played, LINE * thread, 0)
+    swap(finished, LINE * thread, 0)
     return swap(calls, LINE * thread, CALLED) == WAITING
 
 
 @compiled
-def has_played(played: np.ndarray, thread: int):
-    """True once a helper has done its part; looks for a while."""
+def has_finished(finished: np.ndarray, thread: int):
+    """Return whether a helper has finished its part; polls for a while."""
     for _ in range(PATIENCE):
-        if look_at(played, LINE * thread) == 1:
+        if look_at(finished, LINE * thread) == 1:
             return True
     return False
 
@@ -135,13 +135,13 @@ def has_played(played: np.ndarray, thread: int):
 @compiled
 def stay(
     steps: np.ndarray, ends: np.ndarray, turns: np.ndarray, done: np.ndarray,
-    taken: np.ndarray, thread: int, calls: np.ndarray, played: np.ndarray,
+    taken: np.ndarray, thread: int, calls: np.ndarray, finished: np.ndarray,
 ):  # fmt: skip
-    """Play, and wait for the next call without the GIL; returns when there was none for a while."""
+    """Run, and wait for the next call without the GIL; returns when there was none for a while."""
     while True:
         play(steps, ends, turns, done, taken, thread)
-        swap(calls, LINE * thread, WAITING)  # first: whoever sees that this one has played may call
-        swap(played, LINE * thread, 1)
+        swap(calls, LINE * thread, WAITING)  # first: a caller that reads "finished" may call
+        swap(finished, LINE * thread, 1)
         for _ in range(PATIENCE):
             if look_at(calls, LINE * thread) == CALLED:
                 break

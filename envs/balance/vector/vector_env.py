@@ -85,8 +85,9 @@ class BalanceVectorEnv(Copyable, VectorEnv):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start episodes: environment i with `seed` + i, or with entry i of a list.
 
-        `options` are those of a single environment, for each; "reset_mask" (n,) bool besides them
-        resets only some. Raises ConfigError for a wrong number of seeds, mask or option.
+        `options` are those of a single environment, for each. In addition "reset_mask" (n,) bool
+        selects the environments to reset. Raises ConfigError for a wrong number of seeds, mask or
+        option.
         """
         n, options = self.num_envs, option_mapping(options)
         seeds = self._seeds(seed)

@@ -58,7 +58,7 @@ class DrakePlant:
 
     Attributes:
         plant, context: Drake's plant, and its part of a diagram's context.
-        qpos: (nj,) of each joint its place in Drake's positions; likewise `qvel` in velocities.
+        qpos, qvel: (nj,) of each joint its index in Drake's positions and velocities.
         bodies: Drake's body index → MuJoCo's.
     """
 

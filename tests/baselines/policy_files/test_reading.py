@@ -198,7 +198,7 @@ def test_a_known_network_is_found_by_its_sum(
         read(path)
     assert "own: policy: the network of own is not here" in str(error.value)
     other = write_onnx(there / "policy.onnx", linear(3, 2, seed=1))
-    with pytest.raises(ConfigError, match=f"{other} has another sum than the known one"):
+    with pytest.raises(ConfigError, match=f"{other} has another checksum than the known one"):
         read(path)
     text = path.read_text()
     path.write_text(f"{text}policy: {other}\n")
@@ -397,7 +397,7 @@ def test_torchscript_is_code(script: Path) -> None:
     """It is not loaded unless the user allows the file, by whatever path."""
     path = script.with_name("policy.pt")
     for place in (script, script.parent):
-        with pytest.raises(ConfigError, match="wants to run code") as error:
+        with pytest.raises(ConfigError, match="runs external code") as error:
             controller_config(str(place))
         assert f"--allow {path}" in str(error.value)
     with poise.allowing(str(script.with_name("other.pt"))), pytest.raises(ConfigError):

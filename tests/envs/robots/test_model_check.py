@@ -1,4 +1,4 @@
-"""Roots that do not float, and other things that move, get the advice that mends them."""
+"""Roots that do not float, and other moving parts, get the advice that mends them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,14 @@ ADVICE = {
         "them by a free joint, <freejoint/>, of the body 'trunk'",
     ),
     "fixed": ({"root_joint": ""}, "nothing moves the root 'trunk', it is fixed to the world: give"),
-    "a ball before": ({"world": BALL}, "other things that move: 'ball' (the free joint 'rolls')"),
-    "a door before": ({"world": DOOR}, "other things that move: 'door' (the hinge joint 'swings')"),
+    "a ball before": (
+        {"world": BALL},
+        "other than the robot 'trunk': 'ball' (the free joint 'rolls')",
+    ),
+    "a door before": (
+        {"world": DOOR},
+        "other than the robot 'trunk': 'door' (the hinge joint 'swings')",
+    ),
 }
 
 
@@ -41,7 +47,7 @@ def test_a_second_tree_after_the_robot(tmp_path: Path, thing: str) -> None:
     path = write_biped(tmp_path)
     model = path.with_suffix(".xml")
     model.write_text(model.read_text().replace("</worldbody>", f"{thing}</worldbody>"))
-    with pytest.raises(ConfigError, match="besides the robot 'trunk' the model has other things"):
+    with pytest.raises(ConfigError, match="model has moving parts other than the robot 'trunk'"):
         load_robot(path)
 
 

@@ -258,7 +258,7 @@ WRONG = [
     ({"extra": WELD}, ["closed kinematic loops"]),
     (
         {"world": "<body><joint/><geom size='0.02'/></body>"},
-        ["root", "other things that move", "hinge joint"],
+        ["root", "moving parts other than the robot", "hinge joint"],
     ),
     ({"world": BALL.replace("<joint type='ball'/>", "<freejoint/>")}, ["root"]),
     ({"leg": LEG.replace('axis="0 1 0"', 'axis="0 0 0"')}, ["does not compile"]),

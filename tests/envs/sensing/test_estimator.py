@@ -85,11 +85,14 @@ def test_auto_is_exact_where_no_sensor_errs():
         "motors": {"lag": 0.006},
     }
     source = estimated(level)
-    assert source.belief.steps[:4].tolist() == [5, 7, 12, 1]
+    assert source.estimation.steps[:4].tolist() == [5, 7, 12, 1]
     under = {"latency": {"sense": 0.01, "misjudged": -0.004}}
-    assert estimated(under).belief.steps[:4].tolist() == [5, 0, 3, 1]
-    assert estimated("lab").belief.steps[3] == 0 and estimated("lab", kind="exact").belief.steps[3]
-    assert estimated(level, predictor="none").belief.steps[:4].tolist() == [5, 7, 0, 1]
+    assert estimated(under).estimation.steps[:4].tolist() == [5, 0, 3, 1]
+    assert (
+        estimated("lab").estimation.steps[3] == 0
+        and estimated("lab", kind="exact").estimation.steps[3]
+    )
+    assert estimated(level, predictor="none").estimation.steps[:4].tolist() == [5, 7, 0, 1]
 
 
 @pytest.mark.parametrize(
@@ -122,4 +125,4 @@ def test_the_drawn_robot_is_what_the_source_begins_with(source):
     source.plant.become(drawn)
     source.simulation.reset()
     source.begin(drawn, np.zeros(robot().model.nu))
-    assert source.drawn is drawn and source.belief.steps[0] == drawn.sense
+    assert source.drawn is drawn and source.estimation.steps[0] == drawn.sense

@@ -31,7 +31,7 @@ def pushed(source: EstimatedState, push: Push | None, ticks: int) -> tuple[np.nd
         source.update()
         force = source.simulation.data.xfrc_applied[body, :3].copy()
         arm = source.simulation.data.xipos[body] - state.com
-        seen.append(source.belief.force.wrench.copy())
+        seen.append(source.estimation.force.wrench.copy())
         true.append(np.concatenate([force, np.cross(arm, force)]))
     return np.array(seen), np.array(true)
 
@@ -122,7 +122,7 @@ def test_a_load_is_learned(level, off):
     holding(source, 3.0)
     true, believed, g = source.simulation, source.state, robot().units.gravity
     weight = true.arrays.mass * g
-    force, nx, ny = source.belief.force.load
+    force, nx, ny = source.estimation.force.load
     assert np.hypot(nx, ny) / weight > 0.008
     assert robot().mass * g - force == pytest.approx(weight, rel=0.005)
     assert robot().mass * g < 0.95 * weight
@@ -188,8 +188,8 @@ def test_a_push_is_no_load():
     """A push that ankles just hold moves the CoM that is believed by less than 4 mm."""
     source = estimated({"base": "lab"})
     holding(source, 2.0)
-    before = source.belief.force.load.copy()
+    before = source.estimation.force.load.copy()
     source.simulation.set_pushes([Push("torso", 2.05, 0.1, 12.0, 15.0)])
     holding(source, 0.5)
-    moved = np.abs(source.belief.force.load - before)
+    moved = np.abs(source.estimation.force.load - before)
     assert moved[1:].max() < 0.004 * robot().mass * robot().units.gravity

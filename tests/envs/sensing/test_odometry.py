@@ -29,7 +29,7 @@ def velocity_errors(env: ResidualBalanceEnv, first: float, last: float) -> list[
     while env.simulation.time < last - 1e-9 and env.episode.running[0]:
         env.step_without_info(np.zeros(env.action_space.shape))
         rings = source.sensors.rings
-        row = rings.next[0] - 1 - source.belief.steps[0]
+        row = rings.next[0] - 1 - source.estimation.steps[0]
         if env.simulation.time > first + 1e-9:
             errors.append(source.odometry.v[:3] - rings.truth_qvel[row, :3])
     return errors
@@ -118,7 +118,7 @@ def test_raw_readings_are_not_filtered():
     for _ in range(10):
         source.simulation.step(np.zeros(robot().model.nu))
         source.update()
-    rings, late = source.sensors.rings, source.belief.steps[0]
+    rings, late = source.sensors.rings, source.estimation.steps[0]
     row = rings.next[0] - 1 - late
     assert late > 0
     np.testing.assert_allclose(source.odometry.q, rings.q[row], atol=1e-12)

@@ -123,7 +123,7 @@ def test_a_level_is_checked_when_it_is_set(limp):
     """By an environment's configuration as by its property; the level before stays."""
     under(limp, "lab")
     long = {"latency": {"sense": 0.05, "command": 0.05}, "motors": {"lag": 0.1}}
-    with pytest.raises(ConfigError, match="latency: together at most 0.124 s can be led on"):
+    with pytest.raises(ConfigError, match="latency: delays and lag may sum to at most 0.124 s"):
         under(limp, long)
     assert limp.realism.name == "lab"
     with pytest.raises(ConfigError, match="no such name: 'moon'"):

@@ -46,18 +46,18 @@ def test_between_stones_is_the_floor():
 
 def test_errors_are_bounded_known_to_nobody_and_drawn_by_the_seed():
     stairs = Stairs(error=0.02, seed=5)
-    true, known = stairs.surfaces(), stairs.believed()
+    true, known = stairs.surfaces(), stairs.assumed()
     errors = np.array([a.height - b.height for a, b in zip(true, known, strict=True)])
     assert known == Stairs().surfaces()
     assert errors[0] == 0.0 and 0.01 < np.abs(errors).max() <= 0.02
     assert stairs.surfaces() == true != seeded(stairs, 6).surfaces()
-    assert Slope(unseen=True).believed() == [] != Slope().believed()
+    assert Slope(unseen=True).assumed() == [] != Slope().assumed()
 
 
 def test_bumps_lie_around_a_clear_start_and_nobody_knows_of_them():
     bumps = Bumps(count=50, side=0.1, radius=1.0, clear=0.4, lowest=0.005, highest=0.01, seed=2)
     rest = bumps.surfaces()[1:]
-    assert len(rest) == 50 and bumps.believed() == [] and bumps.floor() == 0.0
+    assert len(rest) == 50 and bumps.assumed() == [] and bumps.floor() == 0.0
     assert all(0.005 <= s.height <= 0.01 and s.x_max - s.x_min == pytest.approx(0.1) for s in rest)
     nearest = [np.hypot(*(min(max(0.0, low), high) for low, high in
                           ((s.x_min, s.x_max), (s.y_min, s.y_max)))) for s in rest]  # fmt: skip

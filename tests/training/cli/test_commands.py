@@ -257,7 +257,7 @@ def test_a_broken_pipe_of_another_kind_is_raised(
             ["evaluate", "zero", "--suite", "walk"],
             "suite walk: controller: the controller 'zero' do",
         ),
-        (["walk", "--speed", "9"], "out of reach: 'humanoid' can at most"),
+        (["walk", "--speed", "9"], "out of range: 'humanoid' supports at most"),
         (["walk", "--controller", "momentum-qp"], "the controller 'momentum-qp' does not walk"),
         (["walk", "--controller", "wlk"], "no such controller: 'wlk', did you mean walk?"),
         (["export", "residul", "--out", "out"], "policy: no such policy: 'residul', did you mean"),

@@ -1,4 +1,4 @@
-"""The blocks that the kernels of this room work on: every array and number of a tick by its name.
+"""The blocks of this package's kernels: every array and number of a tick by its name.
 
 `CaptureTick` holds the others. Numbers are in SI units. The frame of the step has its origin at the
 stance sole and its x axis along the heading of the step. ns is the number of soles, nv that of the
@@ -119,7 +119,7 @@ class StepMemory(Block):
     steps: Integer  # steps begun since the reset
     recovering: Integer  # 1 from a step until the robot is calm in its nominal stance
     foot: Integer  # the foot that stepped last; −1: none
-    swinging: Integer  # 1 while that foot is in the air, or about to leave
+    swinging: Integer  # 1 while that foot swings, or is about to leave
     level_frame: Annotated[np.ndarray, 3, 3]  # axes of a level sole along the heading of the step
     clock: Number  # since the last touchdown [s]
     load: Number  # that the foot bore when its step began [N]
@@ -147,7 +147,7 @@ class CaptureTick(Block):
     on_first: ContactTick  # QP with the first sole in contact
     on_second: ContactTick  # QP with the second sole in contact
     on_both: ContactTick  # QP with both soles in contact
-    standing: Tick  # QP with the feet in place, before the first step
+    standing: Tick  # QP with feet fixed, before the first step
     tau: np.ndarray  # (nv−6,) torques of the tick [N·m]
     vdot: np.ndarray  # (nv,) accelerations that they are to bring
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved

@@ -138,8 +138,8 @@ class RecentringConfig:
     calm_tilt: float = number(35.0, "°", above=0.0, max=180.0)  # and its root is tilted less
     calm_time: float = number(0.5, "1/ω", min=0.0)  # for which it must be calm
     # ξ is brought so far from the middle of the stance sole's region, towards where the other foot
-    # goes; and besides this fraction of the other foot's way against it, since the leg that swings
-    # takes ξ along
+    # goes; and also by this fraction of the other foot's way against it, since the swing leg takes
+    # ξ along
     capture_offset: float = number(0.025, "h", min=0.0)
     counterbalance: float = number(0.07, min=0.0)
     arrival_radius: float = number(0.02, "h", above=0.0)  # ξ has arrived when it is this near
@@ -178,11 +178,11 @@ class SwingTask:
 
 @dataclass(frozen=True)
 class CaptureStepConfig:
-    """Feet in place by `qp`; steps by `step_qp` and `swing` where the feet cannot hold."""
+    """Feet fixed by `qp`; steps by `step_qp` and `swing` where this does not suffice."""
 
     kind: Literal["capture-step"] = "capture-step"
-    # The controller that takes its place at levels of realism whose sensors err or whose bodies are
-    # drawn, if joints and IMU may err by `uncertain_from` [rad]; a `base` hands neither on.
+    # The controller that replaces it at realism levels with sensor errors or randomised bodies, if
+    # joints and IMU may err by `uncertain_from` [rad]; a `base` passes neither on.
     uncertain: str | None = field(default=None, metadata={"omit": "default"})
     uncertain_from: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
     # The first step begins when ξ's distance outside the CoP region of both soles, plus

@@ -1,4 +1,4 @@
-"""Feedback of what a pendulum does not know of the body to the choices of a step.
+"""Feedback of the trunk's rotation, which a pendulum omits, to the choices of a step.
 
 A pendulum's capture point says where the fall can be stopped as if the trunk stood still. How it
 leans and turns moves the foothold, the time and the height of the CoM by a linear law

@@ -18,7 +18,7 @@ FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
 @dataclass(frozen=True, eq=False)
 class Swing(Block):
-    """The reference of one swing foot's sole, planned anew each tick from its own last value.
+    """The reference of one swing foot's sole, replanned each tick from its own last value.
 
     Vertically it rises to the apex in the fraction `lift` of the time. Then it comes down, and goes
     on at the landing speed where the ground is late.

@@ -15,7 +15,7 @@ from poise.envs.physics.kinematics import StateArrays
 
 from .config import SwingTask
 
-# ticks of `CaptureTick`: the soles in contact, and those in the air
+# ticks of `CaptureTick`: the soles in contact, and those in swing
 SUPPORTS = (("on_first", (0,), (1,)), ("on_second", (1,), (0,)), ("on_both", (0, 1), ()))
 
 
@@ -49,8 +49,8 @@ def bind_swings(
 ) -> dict[str, Any]:
     """The ticks of `CaptureTick` on the first sole, on the second one and on both.
 
-    In the air the other one follows `way` (3, 3) with its `axes` (3, 3). `legs`: what each leg that
-    stands is to do besides.
+    In its swing the other sole follows `way` (3, 3) with its `axes` (3, 3). `legs`: further tasks
+    of each stance leg.
     """
     gains = swing_gains(sets.arrays, task)
     ticks = {}

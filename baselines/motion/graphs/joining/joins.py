@@ -92,7 +92,7 @@ def capture(before: Clip, after: Clip, duration: float) -> Clip:
     """The end of A and the begin of B bend towards each other: lasts T_A + T_B.
 
     Both meet in slerp(a, b, ½) with the mean rate and acceleration. A is A(t) Exp(o(t)), o a curve
-    of the fifth order that is 0, at rest, `duration`/2 before the seam; B likewise.
+    of the fifth order that is 0, at rest, `duration`/2 before the seam; B is treated the same way.
     """
     after, count = _prepared(before, after, 0.5 * duration, "capture")
     if count >= min(len(before), len(after)):

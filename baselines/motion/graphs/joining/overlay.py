@@ -55,7 +55,7 @@ def overlay(base: Clip, layers: Sequence[Layer]) -> Clip:
     """The base with the layers over it, the first one lowest; it lasts as long as the base.
 
     Joint i is slerp(base_i, over_i(t − t₀), w e(t)), or base_i (over_i(0)⁻¹ over_i)^(w e) for an
-    additive layer. e rises from 0 to 1 as α(u) = 10u³ − 15u⁴ + 6u⁵ over `blend` and falls likewise
+    additive layer. e rises from 0 to 1 as α(u) = 10u³ − 15u⁴ + 6u⁵ over `blend` and falls so, too,
     to the end of the layer, or to that of the base where this is earlier.
 
     Raises:

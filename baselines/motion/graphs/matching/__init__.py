@@ -1,1 +1,1 @@
-"""Motion matching: which frame of many clips goes on best from here to where one wants to be."""
+"""Motion matching: which frame of many clips continues best from here to the commanded pose."""

@@ -16,7 +16,7 @@ RATE = 1.0 / 30.0  # [s] between frames
 
 
 class Match(NamedTuple):
-    """A frame of a clip, and its distance from what was asked for."""
+    """A frame of a clip, and its distance from the query."""
 
     clip: int
     frame: int
@@ -28,7 +28,7 @@ class MatchingDatabase:
 
     A column is (value − mean) w/(σ √k), σ the mean standard deviation of the k columns of its
     group, so that groups of equal weight count alike. Frames less than the longest time ahead from
-    the end of their clip are played, but not gone to.
+    the end of their clip are used, but are never matched.
 
     Args:
         clips: resampled to `RATE`.

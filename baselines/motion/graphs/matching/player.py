@@ -19,7 +19,7 @@ GAIN = 0.1  # by which share another frame must be nearer than the one that play
 
 
 class Command(NamedTuple):
-    """How one wants to move, along one's own axes."""
+    """The commanded velocity and turn, in the heading frame."""
 
     forward: float = 0.0  # [m/s]
     left: float = 0.0  # [m/s]
@@ -42,7 +42,7 @@ class Command(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """What is played of a clip: its first and last frame, and how far it was from the query."""
+    """A piece of a clip: its first and last frame, and its distance from the query."""
 
     clip: int
     first: int
@@ -72,7 +72,7 @@ def match_motion(
     agree where pieces are joined, those without the hips' sway (`features.steady_heading`).
 
     Args:
-        database: of what is played.
+        database: frames of the clips.
         command: asked at every search.
         duration: [s]; at least 2 frames.
         start: number of a clip, and of a frame in it that is not its last.
@@ -97,7 +97,7 @@ def find_pieces(
     duration: float,
     start: tuple[int, int] = (0, 0),
 ) -> list[Piece]:
-    """The pieces of `match_motion`; the last frame of one is played as the first of the next."""
+    """Return the pieces of `match_motion`; the last frame of one is the first of the next."""
     dt = database.clips[0].dt
     count, every = round(duration / dt), max(round(EVERY / dt), 2)
     clip, frame = start
@@ -105,13 +105,13 @@ def find_pieces(
     if not known or count < 1:
         raise ConfigError(f"must be a frame that another one follows and a time of {dt:.3g} s or "
                           f"more, not {start} and {duration:g} s", field="start")  # fmt: skip
-    pieces, first, distance, played = [], frame, 0.0, 0
-    while played < count:
-        frames = min(every, len(database.clips[clip]) - 1 - frame, count - played)
-        frame, played = frame + frames, played + frames
-        if played == count:
+    pieces, first, distance, done = [], frame, 0.0, 0
+    while done < count:
+        frames = min(every, len(database.clips[clip]) - 1 - frame, count - done)
+        frame, done = frame + frames, done + frames
+        if done == count:
             break
-        query = database.query(clip, frame, command(played * dt).future(database.ahead))
+        query = database.query(clip, frame, command(done * dt).future(database.ahead))
         found = _better(database, query, clip, frame)
         if found is not None:
             pieces.append(Piece(clip, first, frame, distance))

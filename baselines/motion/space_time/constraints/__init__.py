@@ -1,1 +1,1 @@
-"""What a user may ask of a motion besides the clip."""
+"""A user's constraints on a motion, in addition to the clip."""

@@ -12,7 +12,7 @@ from poise.baselines.balance.references.tempo import (
     Pace,
     Tempo,
     make_pace,
-    played_time,
+    motion_time_of,
     slow_down,
 )
 from poise.envs.physics.kinematics import StateArrays, allocate_state
@@ -23,10 +23,10 @@ TICK, H = 0.004, 0.9
 def course(tempo: Tempo, distances: list[float], feet: float = 1.0) -> tuple[Pace, np.ndarray]:
     """The motion's time at each tick, the CoM so far from its reference [h]."""
     pace, state = make_pace(tempo, H), standing(feet)
-    times = [played_time(pace, state, np.zeros(3), 0.0, 0.0)]
+    times = [motion_time_of(pace, state, np.zeros(3), 0.0, 0.0)]
     for k, distance in enumerate(distances, 1):
         state.com[0] = distance * H
-        times.append(played_time(pace, state, np.zeros(3), 0.0, k * TICK))
+        times.append(motion_time_of(pace, state, np.zeros(3), 0.0, k * TICK))
     return pace, np.array(times)
 
 
@@ -64,7 +64,7 @@ def test_rates_of_the_reference_are_those_of_its_clock() -> None:
     seen = []
     for k in range(400):
         state.com[0] = 0.02 * H * np.sin(0.02 * k)
-        s = played_time(pace, state, np.zeros(3), 0.0, k * 1e-4)
+        s = motion_time_of(pace, state, np.zeros(3), 0.0, k * 1e-4)
         sample = np.array([[np.sin(3.0 * s)], [3.0 * np.cos(3.0 * s)], [-9.0 * np.sin(3.0 * s)]])
         slow_down(pace, sample)
         seen.append(sample[:, 0])

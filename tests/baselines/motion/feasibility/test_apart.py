@@ -75,13 +75,13 @@ def test_what_is_cut_in_a_step_or_ends_otherwise_is_refused(robot: Robot) -> Non
     apart = steps_clip(robot, "apart", [FootStep("left", 1.3, 1.9, (Waypoint(1.6, up=0.05),),
                                                  ahead=0.1)], 3.3)  # fmt: skip
     for clip, leave, said in (
-        (ahead, 1.6, "ahead: leave: at 1.60 s a sole is in the air: no join is possible there"),
+        (ahead, 1.6, "ahead: leave: at 1.60 s a foot swings: no join is possible there"),
         (ahead, 2.1, r"ahead: leave: at 2.10 s the feet are \d.\d cm and 0° from how they stand"),
         (apart, None, r"apart: leave: at 3.30 s the feet are \d.\d cm and 0° from how they stand"),
     ):
         with pytest.raises(ConfigError, match=said):
             physical_join(robot, clip, swing, leave=leave)
-    with pytest.raises(ConfigError, match="ahead: enter: at 1.60 s a sole is in the air"):
+    with pytest.raises(ConfigError, match="ahead: enter: at 1.60 s a foot swings"):
         physical_join(robot, swing, ahead, enter=1.6)
     with pytest.raises(ConfigError, match="ahead: dt: has 15 frames a second, and 'arm_swing'"):
         physical_join(robot, swing, replace(ahead, dt=1 / 15))

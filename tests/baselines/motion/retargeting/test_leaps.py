@@ -40,7 +40,7 @@ def test_jumps_are_found_and_runs_are_told_apart() -> None:
     with pytest.raises(ConfigError, match=r"runs: it is off the ground for 0\.\d\d s at 0\.\d\d s"):
         find_leaps(make("run")[0])
     late = replace(clip, root=clip.root[60:], rotations=clip.rotations[60:])
-    with pytest.raises(ConfigError, match="is in the air at its begin or end"):
+    with pytest.raises(ConfigError, match="begins or ends in flight"):
         find_leaps(late)
 
 

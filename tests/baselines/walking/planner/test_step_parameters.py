@@ -11,7 +11,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.arms import arm_scales, largest_swing
 from poise.baselines.walking.planner.command import GaitCommand, command_of
-from poise.baselines.walking.planner.reach import TOLD, least_width, shared_reach
+from poise.baselines.walking.planner.reach import COMMANDED, least_width, shared_reach
 from poise.configs.errors import ConfigError
 from tests.support.shared import robot
 
@@ -135,13 +135,13 @@ def test_a_width_is_commanded(width):
         ({"left": -2.0}, r"left: -2 m/s is .* to the side .* 'humanoid' can at most .* m/s"),
         (
             {"turn": 1.9},
-            r"turn: 1\.9 rad/s in steps of .* 'humanoid' can -.* \(-.*°/s\), where its hi",
+            r"turn: 1\.9 rad/s in steps of .* 'humanoid' supports -.* \(-.*°/s\), where its hi",
         ),
-        ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of reach.* joints end"),
-        ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of reach.* soles do not overlap"),
-        ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of reach"),
-        ({"ahead": 0.5, "arm_swing": 3.0}, r"arm_swing: 3 rad is out of reach.* at most"),
-        ({"ahead": 0.8, "step_length": 0.1}, r"step_length: 0\.1 m at 0\.8 m/s is out of reach"),
+        ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of range.* joints end"),
+        ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of range.* soles do not overlap"),
+        ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of range"),
+        ({"ahead": 0.5, "arm_swing": 3.0}, r"arm_swing: 3 rad is out of range.* at most"),
+        ({"ahead": 0.8, "step_length": 0.1}, r"step_length: 0\.1 m at 0\.8 m/s is out of range"),
     ],
 )
 def test_a_command_out_of_reach_is_refused_with_the_limits_of_the_robot(command, said):
@@ -160,28 +160,28 @@ def test_the_reach_of_a_robot_is_what_it_is_not_refused(name):
     """Each end by itself is taken, and what is beyond it is not."""
     walker = load_controller("walk", robot(name))
     reach, said = walker.reach, {}
-    for told in TOLD:
-        for end, sign in zip(getattr(reach, told), (-1.0, 1.0), strict=True):
+    for key in COMMANDED:
+        for end, sign in zip(getattr(reach, key), (-1.0, 1.0), strict=True):
             if end == 0.0:  # to have none is no command
                 continue
             for outside in (False, True):
                 value = end + sign * 3e-3 * outside  # [m], [m/s] or [rad]
-                said[told, sign, outside] = _refused(walker, told, value)
-    assert len(said) == 2 * 11 and {key: key[2] for key in said} == said
+                said[key, sign, outside] = _refused(walker, key, value)
+    assert len(said) == 2 * 11 and {case: case[2] for case in said} == said
     assert reach.own_width == pytest.approx(0.288 * robot(name).height_com)
 
 
-def _refused(walker, told, value):
+def _refused(walker, key, value):
     """Whether a walk, slow enough for it, is refused such a step."""
-    command = {told: value}
-    if told == "clearance":  # the longest swing that the planner takes
+    command = {key: value}
+    if key == "clearance":  # the longest swing that the planner takes
         command["step_time"] = walker.gait_limits.time_max / walker.robot.omega
-    if told == "step_length":
+    if key == "step_length":
         command["ahead"] = 0.2
     try:
         walker.check_command(GaitCommand(**command))
     except ConfigError as error:
-        assert error.field == f"command.{'ahead' if told == 'step_length' else told}"
+        assert error.field == f"command.{'ahead' if key == 'step_length' else key}"
         return True
     return False
 

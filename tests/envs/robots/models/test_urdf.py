@@ -179,7 +179,7 @@ REFUSED = {
     ),
     "two free joints": (
         {"extra": WORLD + part("ball", "world", "floating")},
-        "root: besides the robot 'trunk' the model has other things that move: 'ball' ",
+        "root: the model has moving parts other than the robot 'trunk': 'ball' ",
     ),
     "a free joint on the robot": (
         {"extra": part("ball", "trunk", "floating")},

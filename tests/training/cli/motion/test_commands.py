@@ -95,7 +95,7 @@ def test_steps_are_joined_and_put_together(
     planted = read_robot_clip("both.npz").planted
     assert planted is not None and (~planted).sum() == (~ahead_clip(robot).planted).sum()
     assert main([*joined, "--leave", "1.6"]) == 2
-    assert "leave: at 1.60 s a sole is in the air" in capsys.readouterr().err
+    assert "leave: at 1.60 s a foot swings" in capsys.readouterr().err
     of_robot = ["--robot", "humanoid"]
     assert main(["motion", "graph", "ahead.npz", "swing.npz", "--out", "g.yaml", *of_robot]) == 0
     synth = ["motion", "synth", "swing -> ahead", "--graph", "g.yaml", "--out", "made.npz"]

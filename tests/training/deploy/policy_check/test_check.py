@@ -103,7 +103,7 @@ def test_a_bare_script_is_code(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["evaluate", str(path), "--robot", "compact"]) == 2
     assert f"poise policies check {path} --robot unitree_g1" in capsys.readouterr().err
     assert main(check) == 2
-    assert "wants to run code" in capsys.readouterr().err
+    assert "runs external code" in capsys.readouterr().err
     assert main([*check, "--allow", str(path)]) == 1
     assert "takes observation 84; gives action 25" in capsys.readouterr().out
 

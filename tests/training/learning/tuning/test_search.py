@@ -289,7 +289,7 @@ def test_a_search_for_a_walk(tmp_path, in_process):
     assert found["gait"]["height"] != to_dict(controller_config("walk"))["gait"]["height"]
     stands = {"controller": "momentum-qp", "gains": {"com.weight": [1, 2]}}
     fast = {"walks": {"commands": [{"ahead": 9.0}]}}
-    for changed, message in ((stands, "does not walk"), (fast, "out of reach")):
+    for changed, message in ((stands, "does not walk"), (fast, "out of range")):
         with pytest.raises(ConfigError, match=message):
             tune(walking(**changed), tmp_path / "none")
     assert not (tmp_path / "none").exists()

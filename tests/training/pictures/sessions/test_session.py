@@ -263,7 +263,7 @@ def test_a_command_out_of_reach_leaves_the_one_that_holds(walk: Session) -> None
     walk.step()
     held, trial = walk.command, walk.trial
     for wrong in ({"width": 2.0}, {"ahead": 0.3, "clearance": 0.5}, {"ahead": 9.0}):
-        with pytest.raises(ConfigError, match="is out of reach: 'humanoid' can"):
+        with pytest.raises(ConfigError, match="is out of range: 'humanoid' supports"):
             walk.walk(**wrong)
     assert walk.command == held and walk.trial == trial
     walker = walk.sides[0].walker
