@@ -87,7 +87,7 @@ def follow_command(t: WalkTick) -> None:
 @compiled
 def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
     """The CoP that brings ξ to where the first swing can begin, into `p`; whether it is there."""
-    c, g, xi = t.walk, t.gait, t.xi
+    c, g, xi = t.walk, t.gait, t.walk.state.capture_point
     new = c.memory.foot[0]
     put_middle(t, new, t.stance)
     level = c.memory.level_frame
@@ -103,7 +103,7 @@ def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
 def transfer_cop(t: WalkTick, p: np.ndarray) -> bool:
     """The CoP on its way to the sole that has landed, into `p`; whether it has arrived."""
     c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
-    new, xi = c.memory.foot[0], t.xi
+    new, xi = c.memory.foot[0], c.state.capture_point
     put_middle(t, new, t.stance)
     offset = offset_from(t, 1 - new)
     fraction = min(g.clock[0] / g.transfer_time, 1.0)
@@ -202,7 +202,7 @@ def has_stopped(t: WalkTick) -> bool:
         return True
     if abs(v[2]) * g.width > g.speed_margin or (footholds_given(t) and not feet_are_level(t)):
         return False
-    feet, level, xi = c.state.sole_point, c.memory.level_frame, t.xi
+    feet, level, xi = c.state.sole_point, c.memory.level_frame, c.state.capture_point
     outside = distance_beyond(
         t.walk.search.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1],
         level[0, 0], level[1, 0], xi[0], xi[1],
@@ -230,8 +230,6 @@ def count_failures(t: WalkTick) -> None:
 def gait_tick(t: WalkTick) -> bool:
     """A tick of the walk; False instead of torques where it is over."""
     m = t.walk.memory
-    for a in range(2):
-        t.xi[a] = t.walk.state.capture_point[a] + t.walk.search.force_offset[a]
     follow_command(t)
     copy_reference(t.walk)
     if footholds_given(t) and t.gait.treads.lean > 0.0:
@@ -251,7 +249,11 @@ def gait_tick(t: WalkTick) -> bool:
 
 @compiled
 def walk_tick(t: WalkTick) -> None:
-    """One tick of `Walk`: `tau` then holds torques."""
+    """One tick of `Walk`: `tau` then holds torques.
+
+    What pushes is watched, for when it stands again, but the gait does not lean against it: with
+    ξ + k F̂ h/W for ξ it fell more often in side wind.
+    """
     g = t.gait
     if not g.walking[0] and is_commanded(g) and not t.capture.memory.swinging[0]:
         start_walking(t)

@@ -83,7 +83,6 @@ class Compensation(Block):
     release: float  # [m]
     return_time: float  # [s]
     margin: float  # [m]
-    offset: np.ndarray  # (2,) k F̂ h/W [m], world: what the force adds to the capture point
     shift: Annotated[np.ndarray, 2]  # Δ [m], world
     share: Number  # λ
 
@@ -94,7 +93,6 @@ def make_compensation(
     state: StateArrays,
     given: TargetArrays,
     period: float,
-    offset: np.ndarray,
     observes: bool,
 ) -> Compensation:
     """The block of a controller with this `period` [s]; inactive without a configuration, when the
@@ -104,7 +102,6 @@ def make_compensation(
     moved = replace(given, com=guarded_zeros(3), cop=guarded_zeros(2)) if active else given
     made = Compensation.allocate(
         active=active, observes=observes, robot=robot, state=state, given=given, moved=moved,
-        offset=offset,
         push=push_force(omega, c.smoothing, c.memory),
         period=period, gain=c.gain, reach=c.reach * h, full_at=c.full_at * force,
         release=c.release * h, return_time=c.return_time / omega, margin=c.margin * h,
@@ -124,7 +121,6 @@ def rebound(c: Compensation, state: StateArrays, given: TargetArrays) -> Compens
 def forget_compensation(c: Compensation) -> None:
     """Start an episode."""
     forget_pushes(c.push)
-    c.offset[:] = 0.0
     c.shift[:] = 0.0
     c.share[0] = 1.0
 
@@ -143,24 +139,22 @@ def set_share(c: Compensation) -> None:
 
 @compiled
 def watch(c: Compensation) -> None:
-    """Observe what pushes: the estimate of this tick, and k F̂ h/W."""
+    """Observe what pushes in this tick."""
     observe_push(c.push, c.robot, c.state, c.period)
-    height = max(c.state.com[2] - c.state.origin[2], 0.2 * c.robot.height_com)
-    per_force = c.gain * height / borne_weight(c.robot, c.state)
-    for a in range(2):
-        c.offset[a] = per_force * c.push.force[a]
 
 
 @compiled
 def set_shift(c: Compensation) -> None:
     """Δ, before it is shortened."""
-    push = c.push
+    s, push = c.state, c.push
+    height = max(s.com[2] - s.origin[2], 0.2 * c.robot.height_com)
+    per_force = c.gain * height / borne_weight(c.robot, s)
     mean, lasting = np.sqrt(push.mean[0] * push.mean[0] + push.mean[1] * push.mean[1]), 0.0
     if mean > 0.0:
         one_sided = min(mean / push.size[0], 1.0)
         lasting = c.share[0] * c.reach * min(mean / c.full_at, 1.0) * one_sided / mean
     for a in range(2):
-        c.shift[a] = -c.offset[a] - lasting * push.mean[a]
+        c.shift[a] = -per_force * push.force[a] - lasting * push.mean[a]
 
 
 @compiled

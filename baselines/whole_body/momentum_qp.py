@@ -16,7 +16,6 @@ from poise.baselines.solvers import QP, Status, make_solver
 from poise.baselines.warmup import prepare
 from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -129,8 +128,6 @@ class MomentumQP(BoundQP, CompiledController):
         if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
             self.solver = make_solver(self.config.solver, **self.config.solver_options)
         self._motor_joints = self.arrays.motor_dofs - 6
-        #: (2,) what the force adds to the capture point [m], see `Compensation.offset`
-        self.force_offset = guarded_zeros(2)
         self.observes_force = True  #: false: whoever calls its tick watches what pushes
         self._compensation: Compensation | None = None
         self._assembly: Assembly | None = None
@@ -194,9 +191,8 @@ class MomentumQP(BoundQP, CompiledController):
         s, t, known = state.arrays, targets.arrays(), self._compensation
         if known is None:
             known = make_compensation(
-                self.config.compensation, self.arrays, s, t, self.period, self.force_offset,
-                self.observes_force,
-            )  # fmt: skip
+                self.config.compensation, self.arrays, s, t, self.period, self.observes_force
+            )
         self._compensation = rebound(known, s, t)
         return self._compensation
 

@@ -230,7 +230,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             return known.search
         return make_search(
             self.robot, s, self.region, self._step_limits or c.limits, c.foothold, self.feedback,
-            self.offsets.values, self.foothold_rule, self._arc, self.qp.force_offset,
+            self.offsets.values, self.foothold_rule, self._arc,
         )  # fmt: skip
 
     def block(self, state: RobotState, targets: Targets) -> Block:

@@ -64,7 +64,7 @@ def must_step(t: CaptureTick) -> bool:
             q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
         )
         return outside > g.restep_margin + t.offsets[TRIGGER]
-    x, y = s.capture_point[0] + q.force_offset[0], s.capture_point[1] + q.force_offset[1]
+    x, y = s.capture_point[0], s.capture_point[1]
     cos, sin = s.heading[0], s.heading[1]
     outside = distance_beyond(
         q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y

@@ -92,7 +92,6 @@ class WalkTick(Block):
     model: Program  # its kernel
     arms: Arms
     constant_height: int  # 1: the gait's own height holds, and no model is asked
-    xi: Annotated[np.ndarray, 2]  # ξ, with what an estimated force adds to it [m]
     stance: Annotated[np.ndarray, 2]  # scratch: the middle of what the stance sole reaches [m]
     swinging: Annotated[np.ndarray, 2]  # scratch: the same of the other one
 

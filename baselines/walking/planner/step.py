@@ -138,7 +138,7 @@ def follow_model(t: WalkTick) -> None:
 def plan_cop(t: WalkTick) -> None:
     """The CoP of the stance sole that brings ξ to the end of a regular step, into `gait.cop`."""
     c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
-    foot, level, xi = c.memory.foot[0], c.memory.level_frame, t.xi
+    foot, level, xi = c.memory.foot[0], c.memory.level_frame, c.state.capture_point
     stance = c.state.sole_point[1 - foot]
     n = single_support_region(
         t.walk.search.region, 1 - foot, stance, level[0, 0], level[1, 0], c.corners
@@ -160,7 +160,7 @@ def foothold_after(t: WalkTick, time: float) -> float:
     """The foothold for a touchdown after `time` [s], into `search.foothold`; how far limits keep it
     from the one desired [m]."""
     c, g, q, omega = t.walk, t.gait, t.walk.search, t.walk.state.omega[0]
-    foot, xi = c.memory.foot[0], t.xi
+    foot, xi = c.memory.foot[0], c.state.capture_point
     factor, growth = transfer_factor(omega, g.transfer_time), np.exp(omega * time)
     offset = offset_from(t, 1 - foot)
     for a in range(2):

@@ -6,13 +6,14 @@ import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
 
-MUJOCO, DRAKE = "mujoco", "drake"
+MUJOCO: Final = "mujoco"
+DRAKE: Final = "drake"
 #: engine → the module that it needs, and how to get it
 NEEDS = {DRAKE: ("pydrake", "pip install 'poise[drake]', or pip install --no-deps drake")}
 

@@ -90,11 +90,16 @@ class DrakeEngine(Engine):
         wrench, count = np.zeros(6), self.physics.substeps
         bodies: list[int] = []
         for _ in range(count):
+            if not np.isfinite([*d.qpos, *d.qvel, *forces]).all():
+                d.warning[DIVERGED].number += 1
+                return
             plant.write(d.qpos, d.qvel)
             given = plant.to_drake(rotation(d.qpos[3:7]), forces + self._friction(d.qvel))
             try:
                 values = plant.step(given)
-            except RuntimeError:  # its solver finds no solution: numbers have become too large
+            except RuntimeError as error:  # numbers so large that its solver finds no solution
+                if not any(word in str(error) for word in ("converge", "NaN")):
+                    raise
                 d.warning[DIVERGED].number += 1
                 return
             part, bodies = plant.contacts()

@@ -83,10 +83,11 @@ class DrakePlant:
         self._add_ground()
         gravity = self.plant.mutable_gravity_field()
         gravity.set_gravity_vector(np.array(model.opt.gravity))
-        self.plant.Finalize()
-        self._filter()
-        self.diagram = builder.Build()
-        self.diagram_context = self.diagram.CreateDefaultContext()
+        with _silenced("drake"):  # it warns that a half space does not touch what is deformable
+            self.plant.Finalize()
+            self._filter()
+            self.diagram = builder.Build()
+            self.diagram_context = self.diagram.CreateDefaultContext()
         self.context = self.plant.GetMyMutableContextFromRoot(self.diagram_context)
         self._index()
 
@@ -166,10 +167,9 @@ class DrakePlant:
     def _add_ground(self) -> None:
         plant, model = self.plant, self.robot.model
         material = self._material(ROUGH, None)
-        with _silenced("drake"):  # it warns that a half space does not touch what is deformable
-            self._ground = plant.RegisterCollisionGeometry(
-                plant.world_body(), RigidTransform(), HalfSpace(), "ground", material
-            )
+        self._ground = plant.RegisterCollisionGeometry(
+            plant.world_body(), RigidTransform(), HalfSpace(), "ground", material
+        )
         self._points, self._shapes = [], {}
         for each in ground_points(self.robot):
             link = self._links[int(model.geom_bodyid[each.geom])]

@@ -155,13 +155,21 @@ def test_other_solvers_lean_too():
 
 
 @pytest.mark.parametrize("name", ["capture-step", "feedback-step", "walk"])
-def test_controllers_that_step_take_it_from_their_standing_qp(name):
-    """With `qp.compensation` the capture point that steps follow is moved by k F̂ h/W."""
+def test_controllers_that_step_lean_while_they_stand_and_watch_while_they_step(name):
+    """With `qp.compensation` c_ref is moved before the first step; after it, F̂ is still known."""
     config = controller_config({"base": name, "uncertain": None, "qp": {"compensation": {}}})
-    push = {"body": "torso", "force": 30.0, "duration": 4.0, "direction": 90.0, "start": 0.2}
+    push = {"body": "torso", "force": 25.0, "duration": 4.0, "direction": 90.0, "start": 0.2}
     env = played(config, push, 2.5, ResidualStepEnv)
-    search = env.stepper.tick(env.state_source.state, env.targets).search
-    assert search.force_offset[1] > 0.02 and abs(search.force_offset[0]) < 0.01
+    assert env.stepper.steps == 0
+    standing = env.stepper.qp.compensation(env.state_source.state, env.targets)
+    assert standing.shift[1] < -0.03 and abs(standing.shift[0]) < 0.02
+    env = played(config, {**push, "force": 120.0}, 1.2, ResidualStepEnv)
+    assert env.stepper.steps > 0
+    seen = env.stepper.qp.compensation(env.state_source.state, env.targets).push.force
+    before = seen.copy()
+    for _ in range(env.ticks):
+        env._tick_in_python()
+    assert np.abs(seen - before).max() > 0.01  # [N]: it is not frozen where the first step began
 
 
 def test_it_belongs_to_the_standing_qp():

@@ -538,3 +538,11 @@ def test_too_little_memory_is_told_in_a_line(
     error = mujoco.FatalError("invalid name")
     with pytest.raises(mujoco.FatalError, match="invalid name"):
         entry.main(["list"])
+
+
+@pytest.mark.parametrize(("push", "code"), [("5@90", 0), ("150@0", 1)])
+def test_a_walk_that_falls_exits_with_code_1(
+    push: str, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["walk", "--duration", "4", "--push", push, "--push-at", "1.5"]) == code
+    assert ("fell after" in capsys.readouterr().out) == bool(code)

@@ -36,7 +36,7 @@ def sustained_figures(played: Played, mass: float) -> list[SustainedFigures]:
         found.append(
             {
                 "profile": name,
-                **counts([outcome for _, outcome in own]),
+                **counts(own),
                 "f50": fitted.fit.j50,
                 "f50_ci95": fitted.j50_ci,
                 "f50_bound": fitted.fit.bound,
@@ -62,7 +62,7 @@ def gust_figures(played: Played) -> GustFigures:
     rng = np.random.default_rng(0)
     drawn = rng.choice(numbers, (RESAMPLES, len(numbers))).mean(axis=1)
     return {
-        **counts([outcome for _, outcome in played]),
+        **counts(played),
         "pushes": max(len(trial.pushes) for trial, _ in played),
         "survived_mean": float(numbers.mean()),
         "survived_ci95": percentile_interval(drawn, (len(numbers), 1)),

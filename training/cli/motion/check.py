@@ -186,7 +186,7 @@ def follow(
             if out is not None:
                 write_atomic(out, json.dumps([asdict(each) for each in tracked], indent=1) + "\n")
                 print(out)
-            return
+            return 1 if any(each.fallen for each in tracked) else 0
         if fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return 0

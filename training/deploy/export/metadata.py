@@ -135,6 +135,8 @@ def scale_of(term: Term, scales: Scales) -> str:
         "0.2 ω h": scales.velocity,
         "0.1 m h² ω": scales.momentum,
         "m g": scales.weight,
+        "0.1 m g": 0.1 * scales.weight,
+        "0.02 m g": 0.02 * scales.weight,
         "ω": omega,
         "0.2 ω": 0.2 * omega,
         "3 ω": 3.0 * omega,

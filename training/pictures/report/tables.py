@@ -59,7 +59,8 @@ def ranking(results: Results, baseline: str) -> Table | None:
     """Every controller with what the benchmark measures, the best first."""
     entries, rated = results.summary["controllers"], results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
-    rates = (NOT_FALLEN, AS_COMMANDED) if walked(entries) else (RECOVERED, NOT_FALLEN)
+    second = replace(NOT_FALLEN, ends="")  # there is no room for two intervals
+    rates = (NOT_FALLEN, AS_COMMANDED) if walked(entries) else (RECOVERED, second)
     columns: tuple[Column, ...] = (
         RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
         replace(HALF_AT, unit=f"× {results.summary['scale']}", words="half of the trials survive"),

@@ -52,7 +52,6 @@ class Search(Block):
     margin: float  # [m]
     time_price: float  # [m/s]
     arc: float  # of an `IPMStep`
-    force_offset: np.ndarray  # (2,) what an estimated force adds to ξ, see `Compensation` [m]
     capture_point: Annotated[np.ndarray, 2]  # ξ, and what turn and lean of the body add to it [m]
     corners: Annotated[np.ndarray, "k", 2]  # scratch: what the stance sole reaches [m]
     cop: Annotated[np.ndarray, 2]  # the point of it that is nearest to ξ [m]

@@ -13,7 +13,6 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import drifted_point
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, placed
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 
@@ -40,14 +39,10 @@ CHANGE_PRICE = 0.02  # [m/s] of another step time while the foot swings
 
 @compiled
 def set_capture_point(q: Search) -> None:
-    """Set the capture point that steps and CoP follow: ξ + r + k F̂ h/W.
-
-    r is that of `PivotConfig`. A pendulum under a force F has ξ̇ = ω (ξ − p) + F/(m ω), so that
-    ξ + F/(m ω²) moves as ξ does without; k F̂ is zero without `ForceCompensation`.
-    """
+    """Set the capture point that steps and CoP follow: ξ + r, see `PivotConfig`."""
     x, y = pivot_offset(q.feedback, q.state, PLAN, q.heading[0], q.heading[1])
-    q.capture_point[0] = q.state.capture_point[0] + x + q.force_offset[0]
-    q.capture_point[1] = q.state.capture_point[1] + y + q.force_offset[1]
+    q.capture_point[0] = q.state.capture_point[0] + x
+    q.capture_point[1] = q.state.capture_point[1] + y
 
 
 @compiled
@@ -233,18 +228,15 @@ def make_search(
     offsets: np.ndarray,
     rule: Callable[[Search], None] = capture_foothold,
     arc: float = 0.0,
-    force_offset: np.ndarray | None = None,
 ) -> Search:
     """The search for steps of a robot from a state; `rule` finds the foothold of a foot and time.
 
-    `offsets` (13,) are the `values` of `StepOffsets`, `arc` is that of `IPMStepConfig`, and
-    `force_offset` (2,) that of `Compensation`; zeros if left out.
+    `offsets` (13,) are the `values` of `StepOffsets`, `arc` is that of `IPMStepConfig`.
     """
     search = Search.allocate(
         {"k": region.alone.shape[1]}, state=state, region=region, offsets=offsets,
         feedback=feedback, foot_sign=foot_signs(robot), height=robot.units.height,
         **in_si(Search, limits, robot.units), **in_si(Search, choice, robot.units),
         arc=float(arc), foothold_rule=NO_KERNEL,
-        force_offset=guarded_zeros(2) if force_offset is None else force_offset,
     )  # fmt: skip
     return replace(search, foothold_rule=address_of(rule, search))

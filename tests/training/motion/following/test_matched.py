@@ -1,7 +1,8 @@
-"""Motion matching from the command line: commands as text, and what is refused."""
+"""Motion matching from the command line: commands as text, what is reached and what refused."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -67,3 +68,15 @@ def test_errors_are_one_line(
     assert main(["motion", "match", "humanoid_punch", *more, *out]) == 2
     error = capsys.readouterr().err
     assert text in error and error.count("\n") == 1 and not Path("x.bvh").exists()
+
+
+def test_what_is_reached_and_what_is_beyond_the_clips_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--out", str(tmp_path / "walk.bvh"), "--seconds", "9", "--start", "humanoid_stand@0"]
+    assert main(["motion", "match", "--commands", "0:0", "1:0.5", "5:3", *out]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    (reached,) = re.findall(r"from 1 s: 0.50 m/s commanded, (\d\.\d\d) m/s", text)
+    assert float(reached) == pytest.approx(0.5, rel=0.15)
+    assert re.findall(r"3.00 m/s is beyond the clips, which have 1\.\d\d m/s", text)
+    assert "0.50 m/s is beyond" not in text
