@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.walking.schedule import CommandSampler
@@ -13,10 +15,13 @@ from poise.envs.balance.config import ObservationConfig
 from poise.training.benchmarking.trials.agents import can_walk, load_agent
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.trial import Trial
+from poise.training.deploy.export.check import observations
 from poise.training.deploy.export.metadata import metadata
+from poise.training.deploy.export.stock import write_stock
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
+from poise.training.learning.vec_env import ThreadedVecEnv
 from tests.support.shared import robot, tiny_config
 
 TERMS = ("root_rate", "gravity", "command_velocity", "command_turn", "joint_pos", "last_action")
@@ -73,6 +78,22 @@ def test_an_export_names_its_environment(run: Path) -> None:
     place = names.index("command_velocity")
     assert float(scales[place]) == pytest.approx(1.0 / (0.2 * units["omega"] * units["h"]))
     assert float(scales[names.index("command_turn")]) == pytest.approx(0.2**-1 / units["omega"])
+
+
+def test_sb3_loads_it_without_what_the_critic_saw(run: Path, tmp_path: Path) -> None:
+    """`PPO.load` acts as the policy, on the observations that the policy has."""
+    policy = load_policy(run)
+    env, archive = policy.make_env(), "policy.zip"
+    write_stock(tmp_path, archive, policy, env, run / "best")
+    model = PPO.load(tmp_path / archive, device="cpu")
+    venv = ThreadedVecEnv([env])
+    normalize = VecNormalize.load(str(tmp_path / "vec_normalize.pkl"), venv)
+    seen = observations(policy, 50)
+    assert seen.shape[1] == env.seen == model.observation_space.shape[0]
+    actions, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
+    np.testing.assert_allclose(actions, policy.act(seen), atol=1e-4)
+    assert np.isfinite(normalize.ret_rms.var) and normalize.ret_rms.var != 1.0
+    venv.close()
 
 
 def test_the_packaged_configuration_is_whole() -> None:

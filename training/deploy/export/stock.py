@@ -10,10 +10,11 @@ from scipy.linalg import block_diag
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.mirror import Mirror
-from poise.training.learning.checkpoints import LEFT_OUT, plain, restore_statistics
+from poise.training.learning.checkpoints import LEFT_OUT, plain
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.policy import Policy
 from poise.training.learning.policy_files import (
+    MOMENTS,
     POLICY,
     STATISTICS,
     read_statistics,
@@ -35,16 +36,22 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
     """Write `archive` for `PPO.load`, and the statistics for `VecNormalize.load`.
 
     `env` is the policy's environment, `source` its folder. A symmetric policy becomes an ordinary
-    one of twice the width that is still symmetric. The optimizer starts afresh. Raises PoiseError
-    if SB3's action for an observation differs by more than `TOLERANCE`.
+    one of twice the width that is still symmetric. Privileged inputs of the critic are left out:
+    its values are those at zero. The optimizer starts afresh. Raises PoiseError if SB3's action for
+    an observation differs by more than `TOLERANCE`.
     """
     import torch
     from stable_baselines3.common.vec_env import VecNormalize
 
-    stored = {name: values.numpy() for name, values in read_weights(source / POLICY).items()}
+    seen = env.observation_space.shape[0]
+    stored = {name: _seen(name, values.numpy(), seen)
+              for name, values in read_weights(source / POLICY).items()}  # fmt: skip
     weights, config = _ordinary(stored, policy)
     normalize = VecNormalize(ThreadedVecEnv([env]), gamma=config.ppo.gamma)
-    restore_statistics(source / STATISTICS, normalize)
+    for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms)):
+        known = read_statistics(source / STATISTICS, [f"{prefix}_{name}" for name in MOMENTS])
+        for name, values in zip(MOMENTS, known.values(), strict=True):
+            setattr(moments, name, values[:seen] if values.ndim else values[()])
     limits = read_statistics(source / STATISTICS, ("clip_obs", "epsilon"))
     normalize.clip_obs, normalize.epsilon = float(limits["clip_obs"]), float(limits["epsilon"])
     normalize.training = normalize.norm_reward = False  # it no longer learns, and leaves rewards
@@ -55,10 +62,15 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
         model.num_timesteps = int(policy.state["timesteps"])
         plain(model).save(folder / archive, exclude=LEFT_OUT)
     normalize.save(str(folder / NORMALISATION))
-    seen = observations(policy, CHECKED)
+    shown = observations(policy, CHECKED)
     model.policy.load_state_dict(read_weights(folder / archive))  # as they were written
-    actions, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
-    compared(actions, policy.predict(seen)[0], TOLERANCE, archive)
+    actions, _ = model.predict(normalize.normalize_obs(shown), deterministic=True)
+    compared(actions, policy.predict(shown)[0], TOLERANCE, archive)
+
+
+def _seen(name: str, values: np.ndarray, seen: int) -> np.ndarray:
+    """An array of the networks without the inputs that the critic alone saw in training."""
+    return values[:, :seen] if name.endswith("_net.0.weight") else values
 
 
 def _ordinary(weights: Weights, policy: Policy) -> tuple[Weights, TrainConfig]:
