@@ -32,10 +32,7 @@ class Repertoire:
     clips: dict[str, RobotClip]  #: name → the robot's postures, of those that are not keyframes
 
     def write(self, folder: Path) -> None:
-        """Keep the clips in the folder of the results.
-
-        Raises PoiseError if they cannot be written.
-        """
+        """Keep the clips in the folder of the results; raise PoiseError if that fails."""
         for name, clip in self.clips.items():
             (folder / FOLDER).mkdir(exist_ok=True)
             write_robot_clip(clip, kept(folder, name))
