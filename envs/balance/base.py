@@ -106,7 +106,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         #: of which the observation is made
         self.terms = [*seen, *(replace(t, name=f"true_{t.name}") for t in self._privileged)]
         size = sum(term.size for term in self.terms)
-        #: entries of the observation that a policy sees; the others are privileged
+        #: entries of the policy's observation; the others are privileged
         self.seen = sum(term.size for term in seen)
         sizes = {"na": len(self.action_names), "no": size, "terms": len(REWARD_TERMS)}
         self.episode = EpisodeArrays.allocate(sizes | self.simulation.sizes)

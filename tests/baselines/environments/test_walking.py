@@ -160,7 +160,7 @@ def test_the_error_of_a_stride_is_that_of_the_walk(env):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ({"ahead": [0.2, 9.0]}, r"command\.ahead: 9 m/s .* 'humanoid' can at most .* 1\.85 m/s"),
+        ({"ahead": [0.2, 9.0]}, r"command\.ahead: 9 .* 'humanoid' supports at most .* 1\.85 m/s"),
         ({"ahead": [-3.0, 0.5]}, r"command\.ahead: -3 m/s .* at most"),
         ({"ahead": 0.0, "left": [-0.1, 4.0]}, r"command\.left: 4 m/s .* at most"),
     ],

@@ -131,8 +131,8 @@ def test_a_width_is_commanded(width):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ({"ahead": 9.0}, r"command\.ahead: 9 m/s is steps of .* 'humanoid' can at most .* m/s"),
-        ({"left": -2.0}, r"left: -2 m/s is .* to the side .* 'humanoid' can at most .* m/s"),
+        ({"ahead": 9.0}, r"command\.ahead: 9 m/s is steps .* 'humanoid' supports at most .* m/s"),
+        ({"left": -2.0}, r"left: -2 m/s is .* to the side .* 'humanoid' supports at most .* m/s"),
         (
             {"turn": 1.9},
             r"turn: 1\.9 rad/s in steps of .* 'humanoid' supports -.* \(-.*°/s\), where its hi",
