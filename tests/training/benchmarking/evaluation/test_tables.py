@@ -75,7 +75,7 @@ def test_no_word_of_the_ranking_is_broken(width: int) -> None:
     """What does not fit beside each other is in tables below each other, with one title."""
     summary = json.loads(RESULTS[0].read_text())
     text = printed({**summary, "pairs": []}, width)
-    for word in ("worst", "recovered", "one-step", "failures", "recoveries"):
+    for word in ("worst", "recovered,", "one-step", "failures", "recoveries"):
         assert f" {word} " in text
     first = summary["controllers"][summary["ranking"][0]]
     assert f" {first['j50_min']:.1f} " in text and f" {first['eta_min']:.2f} " in text
