@@ -60,17 +60,12 @@ PRIVATE = {
 #: page → phrases, of these patterns, in which the word is meant or that code still writes
 MEANT = {
     "baselines/motion/synthesis/synthesis.py": ('"played"',),  # a key of the record, read back
-    "docs/leaderboard.md": ("of the mix",),  # heads of columns: training/running/columns.py
-    "docs/leaderboard-booster_t1.md": ("of the mix",),
-    "docs/leaderboard-unitree_g1.md": ("of the mix",),
-    "docs/leaderboard-unitree_h1.md": ("of the mix",),
     # a key of summary.json
     "training/benchmarking/metrics/entry.py": ('"played"',),
     "training/benchmarking/results/read.py": ('"played"', "'played'"),
     "training/running/summary.py": ("`played`", "played: Required"),
     # a key of the record of a script, written by baselines/motion/synthesis
     "training/pictures/motion_report/timeline.py": ('record["played"]', 'field="played"'),
-    "training/pictures/report/plots.py": ("metrics.played import",),  # a module's name
     "src/poise_command.py": ("begins anew",),  # the line of training/running/stopping.py
 }
 
