@@ -10,11 +10,10 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .motion.clips import FRAMES, FrameClip, Frames, make_clip
+from .motion.config import TIME_STEP
 from .motion.track import USUAL_ANCHOR
 from .networks import Network, OnnxNetwork
 
-NETWORK = "network"  # in the place of a clip's file
-TIME_STEP = "time_step"  # an input: the frame of the clip, from 0 on; the last one is held
 JOINTS = ("joint_pos", "joint_vel")
 BODIES = ("body_pos_w", "body_quat_w")  # BeyondMimic, mjlab: of all tracked bodies, wxyz
 ANCHOR = ("ref_pos_xyz", "ref_quat_xyzw")  # holosoma: of the anchor

@@ -26,11 +26,11 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .clip_network import NETWORK, network_clip
+from .clip_network import network_clip
 from .config import PolicyFileConfig
 from .joints import JointServos, joint_servos
 from .motion.clips import read_clip, standing_clip
-from .motion.config import MotionConfig
+from .motion.config import NETWORK, MotionConfig
 from .motion.track import MotionTrack
 from .networks import load_network
 from .observations import Observer, follows_commands, tracks_motion

@@ -12,10 +12,10 @@ from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build, on_base
 
 from .bounds import with_pairs
-from .clip_network import NETWORK, TIME_STEP
 from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
 from .known import RIVALS, expect_network
+from .motion.config import NETWORK, TIME_STEP
 from .networks import onnx_session
 from .onnx.bounds import try_network
 from .onnx.files import description, digest, is_network, is_policy_place, only_network

@@ -39,6 +39,7 @@ from poise.configs.reading import (
 from poise.configs.schema import build
 from poise.configs.yaml_loader import DEPTH, DIGITS, NODES
 from poise.envs.balance.config import EnvConfig, env_config
+from poise.envs.physics.engines.config import load_physics
 from poise.envs.robots.robot import load_robot
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.suites.suite import load_suite
@@ -65,6 +66,7 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "limits": lambda path: load_limits(robot(), path),
     "human": load_knee_moment,
     "constraints": read_constraints,
+    "physics": load_physics,
 }
 BOMB = "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 12))
 BOMB = f"a0: &a0 [x, x, x, x, x, x, x, x, x]\n{BOMB}"

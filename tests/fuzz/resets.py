@@ -30,6 +30,7 @@ def _options(draw: Draw) -> Json:
         "noise": 1.0,
         "qpos": robot().standing_qpos.tolist(),
         "qvel": [0.0] * model.nv,
+        "fallen": 3,
         "realism": {},
     }
     kept = draw(st.lists(st.sampled_from(RESET_OPTIONS), unique=True, min_size=1))

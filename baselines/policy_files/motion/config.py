@@ -3,6 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+NETWORK = "network"  # in the place of a clip's file
+TIME_STEP = "time_step"  # an input: the frame of the clip, from 0 on; the last one is held
+
 
 @dataclass(frozen=True)
 class MotionConfig:

@@ -47,9 +47,10 @@ the last tick).
 ARGUMENTS = """
 `render_mode` (None, "rgb_array" or "human"), `width` and `height` of a frame [pixels], `camera`
 (None for Poise's own, a `Camera`, or the name or id of one of the model's), and the fields of
-`EnvConfig` by name: policy_period, duration, pushes, noise, fall, reward, observation, realism (a
-level by name, file or fields; ideal by default), estimator, terrain (a kind or its fields; level by
-default), clip_action. Fields may be plain mappings. Raises ConfigError naming what is wrong.
+`EnvConfig` by name: policy_period, duration, pushes, noise, fallen, fall, reward, observation,
+realism (a level by name, file or fields; ideal by default), estimator, terrain (a kind or its
+fields; level by default), physics (an engine by name, file or fields), clip_action. Fields may be
+plain mappings. Raises ConfigError naming what is wrong.
 """
 
 

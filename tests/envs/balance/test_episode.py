@@ -47,6 +47,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         action=e.action,
         last_action=e.last_action,
         velocity_error=np.array(velocity_error),
+        command=np.zeros(3),
     )
     judge_step(
         Judge(

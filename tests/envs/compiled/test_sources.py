@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import gc
 import importlib
+import importlib.util
 import inspect
 import os
 import sys
@@ -18,6 +19,8 @@ from poise.envs.compiled import sources
 
 ROOT = Path(__file__).resolve().parents[3]
 FILES = sorted(path for room in ("envs", "baselines") for path in (ROOT / room).rglob("*.py"))
+if importlib.util.find_spec("pydrake") is None:
+    FILES = [path for path in FILES if path.name != "drake_plant.py"]  # needs poise[drake]
 
 
 def modules_of(statement: ast.stmt, file: Path) -> set[str]:

@@ -7,7 +7,8 @@ from itertools import product
 from pathlib import Path
 
 from poise.baselines.allowance import check_allowed, is_script
-from poise.baselines.policy_files.clip_network import JOINTS, TIME_STEP
+from poise.baselines.policy_files.clip_network import JOINTS
+from poise.baselines.policy_files.motion.config import TIME_STEP
 from poise.baselines.policy_files.networks import onnx_session
 from poise.baselines.policy_files.script_sizes import script_sizes
 

@@ -9,10 +9,9 @@ import mujoco
 import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.policy_files.clip_network import NETWORK
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.policy_files.motion.config import MotionConfig
+from poise.baselines.policy_files.motion.config import NETWORK, MotionConfig
 from poise.baselines.policy_files.motion.track import MotionTrack
 from poise.baselines.policy_files.observations import tracks_motion
 from poise.baselines.policy_files.reading import is_policy

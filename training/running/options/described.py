@@ -76,7 +76,7 @@ def _sentence(text: str) -> str:
 def options_of(config: Any, prefix: str = "--") -> Iterator[Option]:
     """Yield the options of a dataclass, first its own fields, then those of nested dataclasses.
 
-    A nested dataclass that is None has no options: only a file can set it.
+    A nested dataclass that is None, or one of several, has no options: only a file can set it.
 
     Args:
         config: an instance, whose values are the defaults.
@@ -92,9 +92,7 @@ def options_of(config: Any, prefix: str = "--") -> Iterator[Option]:
             sentence = texts.get(field.name, "")
             for key, each in value.items():
                 yield Option(f"{name}.{key}", "NUMBER", sentence, _text(each), _bounds(field))
-        elif value is not None or not any(
-            map(dataclasses.is_dataclass, get_args(hints[field.name]))
-        ):
+        elif not any(map(dataclasses.is_dataclass, get_args(hints[field.name]))):
             yield Option(name, kind_of(hints[field.name]), texts.get(field.name, ""), _text(value),
                          _bounds(field))  # fmt: skip
     for value, deeper in below:

@@ -15,7 +15,9 @@ from poise.training.benchmarking.evaluation import plots
 def trial(direction: float, fraction: float, recovered: bool) -> Any:
     """A trial of the part `random`, and its outcome."""
     push = SimpleNamespace(direction=direction, impulse=20.0 * fraction, duration=0.1)
-    pushed = SimpleNamespace(part="random", push=push, limit_fraction=fraction)
+    pushed = SimpleNamespace(
+        part="random", push=push, limit_fraction=fraction, judged_by_falls=False
+    )
     return pushed, SimpleNamespace(recovered=recovered)
 
 

@@ -34,7 +34,7 @@ def walker(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("fields", "problem"),
     [
         ({"walker": "walk"}, r"walker: 'walk' is of kind 'walk', no policy from outside "
-                             r"\(choices: asap-loco-g1"),
+                             r"\(choices: amp-getup-g1, asap-loco-g1"),
         ({"walker": "falcon-locos-g1"}, "walker: no such policy: 'falcon-locos-g1', did you mean "
                                         "falcon-loco-g1"),
         ({"walker": "os:system"}, "walker: no such policy: 'os:system'"),

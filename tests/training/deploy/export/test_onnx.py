@@ -171,7 +171,8 @@ def test_scales_turn_si_into_observations() -> None:
 
 
 def test_every_unit_of_a_term_is_a_number() -> None:
-    env = ResidualStepEnv(robot(), observation={"extra": ["push", "root_vel"]}, pushes=None)
+    extra = ["push", "root_vel", "push_force", "push_mean"]
+    env = ResidualStepEnv(robot(), observation={"extra": extra}, pushes=None)
     assert {kind.unit for kind in STEP_TERMS.values()} == {term.unit for term in env.terms}
     assert all(np.isfinite(float(each)) for term in env.terms
                for each in scale_of(term, env.scales).split(";"))  # fmt: skip
