@@ -22,7 +22,7 @@ def command() -> None:
 
 def _leave(number: int, frame: FrameType | None) -> None:
     """Nothing has been begun: there is nothing to unwind."""
-    os.write(2, b"poise: stopped; the same command begins anew\n")
+    os.write(2, b"poise: stopped; the same command starts from the beginning\n")
     os._exit(128 + number)
 
 

@@ -66,7 +66,6 @@ MEANT = {
     "training/running/summary.py": ("`played`", "played: Required"),
     # a key of the record of a script, written by baselines/motion/synthesis
     "training/pictures/motion_report/timeline.py": ('record["played"]', 'field="played"'),
-    "src/poise_command.py": ("begins anew",),  # the line of training/running/stopping.py
 }
 
 #: names that stand for a file of the reader

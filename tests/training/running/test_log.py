@@ -43,7 +43,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_written(tmp_path: Path) -> N
     resource.setrlimit(resource.RLIMIT_FSIZE, (size + 5, before[1]))
     try:
         for _ in range(2):
-            with pytest.raises(PoiseError, match="log: cannot be written .*are kept.*go on"):
+            with pytest.raises(PoiseError, match="log: cannot be written .*are kept.*continue"):
                 log.append(2, "b")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

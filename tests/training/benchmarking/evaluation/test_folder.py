@@ -112,7 +112,7 @@ def test_other_settings_do_not_mix(tmp_path: Path, changes: dict[str, Any], mess
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("suite_name: random\nsuite: {kind: random}\n", "is of an older Poise, .* format 2: play"),
+        ("suite_name: random\nsuite: {kind: random}\n", "is of an older Poise, .* format 2: run"),
         ("benchmark: 1\nsuite_name: quick\n", "is of an older Poise, .* or with --overwrite"),
         ("format: 99\n", "is of format 99, this one reads format 2"),
         (None, "holds files of something else"),
