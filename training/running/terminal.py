@@ -84,10 +84,9 @@ def terminal(stderr: bool = False) -> Console:
 
 
 class ProgressLines(Progress):
-    """A bar in a terminal, elsewhere plain lines: at once, at growing intervals, at the end."""
+    """A bar in a terminal, elsewhere plain lines at growing intervals, the first at once."""
 
     _started = _due = -1.0  # [s], monotonic
-    _printed: tuple[float, ...] = ()  # of each task, how much was completed
 
     def update(self, task_id: TaskID, **changes: Any) -> None:
         """See `Progress`."""
@@ -99,21 +98,11 @@ class ProgressLines(Progress):
             self._started = self._due = now
         if now >= self._due:
             self._due = now + min(max(GROWTH * (now - self._started), SHORTEST), LONGEST)
-            self._print_lines()
-
-    def stop(self) -> None:
-        """See `Progress`."""
-        super().stop()
-        if self._printed and self._printed != tuple(task.completed for task in self.tasks):
-            self._print_lines()
-
-    def _print_lines(self) -> None:
-        self._printed = tuple(task.completed for task in self.tasks)
-        for task in self.tasks:
-            cells = [column(task) for column in self.columns
-                     if not isinstance(column, (str, BarColumn))]  # fmt: skip
-            line = " ".join(filter(None, (str(cell) for cell in cells)))
-            self.console.print(line, markup=False, highlight=False, soft_wrap=True)
+            for task in self.tasks:
+                cells = [column(task) for column in self.columns
+                         if not isinstance(column, (str, BarColumn))]  # fmt: skip
+                line = " ".join(filter(None, (str(cell) for cell in cells)))
+                self.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def progress_bar(console: Console) -> Progress:
