@@ -91,6 +91,6 @@ def test_more_delay_than_can_be_led_on_is_refused():
     level = load_realism(
         {"latency": {"sense": [0.0, 0.05], "command": 0.05}, "motors": {"lag": 0.03}}
     )
-    with pytest.raises(ConfigError, match=r"latency: together at most 0.124 s .*motors.lag 0.03"):
+    with pytest.raises(ConfigError, match=r"latency: .* at most 0.124 s: .*motors.lag 0.03"):
         check_latency(level, 0.002)
     check_latency(level, 0.003)

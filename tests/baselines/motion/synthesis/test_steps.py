@@ -110,7 +110,7 @@ def test_what_cannot_be_joined_is_refused_in_one_line(
 
 
 def test_other_kinds_know_no_steps(robot: Robot, clips: dict[str, Clip]) -> None:
-    with pytest.raises(ConfigError, match="'ahead' has steps, which insert does not know"):
+    with pytest.raises(ConfigError, match="'ahead' has steps, which insert does not support"):
         of_kind(robot, clips, "insert").plan(parse("ahead -> swing"))
     bent = replace(clips["ahead"], rotations=clips["ahead"].rotations.copy())
     bent = bent.cut(0.0, 2.1)

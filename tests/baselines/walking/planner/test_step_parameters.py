@@ -255,5 +255,5 @@ def test_limits_are_those_of_the_robots_size():
     walkers = [load_controller("walk", robot(name)) for name in ("toddler", "tall")]
     wide = GaitCommand(0.3, width=0.7)
     walkers[1].check_command(wide)
-    with pytest.raises(ConfigError, match="'toddler' can"):
+    with pytest.raises(ConfigError, match="'toddler' supports"):
         walkers[0].check_command(wide)

@@ -73,7 +73,7 @@ def test_another_weight_is_refused(layer: int, entry: float, tmp_path: Path) -> 
 
 def test_the_graph_is_small_and_plain() -> None:
     """Operators that any runtime has, weights of 32 bits."""
-    model = onnx.load_from_string(onnx_bytes(policy("residual"), {}))
+    model = onnx.load_from_string(onnx_bytes(policy("residual-lqr-lip"), {}))
     assert {node.op_type for node in model.graph.node} <= {
         "Add", "Cast", "Clip", "Gather", "Gemm", "Mul", "Sub", "Tanh",
     }  # fmt: skip
