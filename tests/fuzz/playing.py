@@ -20,7 +20,7 @@ from . import memory
 from .kinds import Kind
 from .values import Json
 
-SECONDS = 8.0  # of the processor that a case may take: a film of a fall is some 60 pictures by software
+SECONDS = 8.0  # of the processor that a case may take; a film of a fall has some 60 pictures
 MEBIBYTES = 1024.0  # that a case may take besides what the process has
 TEXT = 5000  # characters of an error; some list the choices
 ROOT = Path(poise.__file__).parents[2]

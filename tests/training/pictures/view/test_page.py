@@ -414,7 +414,8 @@ def refuse_and_keep(view: BrowserView) -> None:
     dragged(view, "clearance")
     run_until(view, lambda: sliders["clearance"].value < 0.06)
     assert session.command == held and width.value == 0.3
-    assert "command.clearance" in view._pages._last[1] and "'humanoid' supports" in view._pages._last[1]
+    shown = view._pages._last[1]
+    assert "command.clearance" in shown and "'humanoid' supports" in shown
     view.panel.walk._give_back(SimpleNamespace(client_id=1))
     run_until(view, lambda: session.command.width is None)
     run_until(view, lambda: width.value < 0.23 and sliders["arm_swing"].value == 0.0)
