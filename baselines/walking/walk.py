@@ -97,7 +97,7 @@ class Walk(Commanded, CaptureStep):
         self._walk_tick: WalkTick | None = None
         legs = no_legs() if gait.model.keeps_height else leg_arrays(robot)
         self.reference = allocate_reference(robot, gait.qp.period, legs)
-        self.arms = allocate_arms(robot, self.gait_sets.parameters.accel_weight, gait.arm_weight)
+        self.arms = allocate_arms(robot, self.gait_sets.posture.weight, gait.arm_weight)
         super().__init__(robot, config)
 
     @property

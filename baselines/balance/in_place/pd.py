@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from poise.baselines.controller import BaseController, Targets
-from poise.baselines.whole_body.parameters import joint_kinds
+from poise.baselines.whole_body.tasks.posture import joint_kinds
 from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot

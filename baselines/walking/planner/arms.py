@@ -88,7 +88,7 @@ def feet_apart(t: WalkTick, order: int) -> float:
 def swing_arms(t: WalkTick, period: float) -> None:
     """Add the swing that is commanded to the posture's references; a step takes `period` [s]."""
     arms, own, g = t.arms, t.walk.reference_out, t.gait
-    weight, amplitude = t.walk.on_both.problem.parameters.accel_weight, g.command[ARM_SWING]
+    weight, amplitude = t.walk.on_both.posture.weight, g.command[ARM_SWING]
     if amplitude <= 0.0:
         if arms.swinging[0]:
             copy_into(arms.free_weight, weight)

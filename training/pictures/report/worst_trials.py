@@ -16,7 +16,7 @@ from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.results.replay import replay
 from poise.training.benchmarking.trials.signals import Signals
 
-from .cells import Download, csv_text, download
+from .cells import Download, cells_csv, download
 
 FRAMES = 8  # of a strip
 SIZE = (216, 264)  # of a frame [pixels], shown at half of it: sharp on a phone
@@ -98,7 +98,7 @@ def smallest_lost(results: Results, name: str) -> list[Record]:
     return sorted(lost, key=_size)
 
 
-def film(results: Results, record: Record, times: Sequence[float], draw: bool = True) -> Film:
+def film_again(results: Results, record: Record, times: Sequence[float], draw: bool = True) -> Film:
     """Play a trial again; `times` [s] are those of the frames, if any are drawn.
 
     Raises:
@@ -172,7 +172,7 @@ def signals_csv(name: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> 
     header += ["support_x_low", "support_x_high", "support_y_low", "support_y_high", "torque"]
     blocks += [columns["support"].reshape(len(t), 4), columns["torque"][:, None]]
     lines = [[f"{value:.5g}" for value in line] for line in np.hstack(blocks)]
-    return download(f"{name}.csv", csv_text(header, lines))
+    return download(f"{name}.csv", cells_csv(header, lines))
 
 
 def compressed(frame: np.ndarray) -> bytes:

@@ -91,12 +91,12 @@ def test_no_arm_swing_is_the_walk_as_it_was_bit_for_bit():
     """Zero or None; and the weights of the posture are as before when it is taken back."""
     ends = [Played((3.0, GaitCommand(0.5, arm_swing=swing))).env for swing in (None, 0.0)]
     np.testing.assert_array_equal(*(env.simulation.data.qpos for env in ends))
-    weight = ends[0].controller.gait_sets.parameters.accel_weight.copy()
+    weight = ends[0].controller.gait_sets.posture.weight.copy()
     env = Played((1.5, GaitCommand(0.5, arm_swing=0.4))).env
-    assert np.any(env.controller.gait_sets.parameters.accel_weight != weight)
+    assert np.any(env.controller.gait_sets.posture.weight != weight)
     env.command = GaitCommand(0.5)
     env.step(np.zeros(len(env.action_names)))
-    np.testing.assert_array_equal(env.controller.gait_sets.parameters.accel_weight, weight)
+    np.testing.assert_array_equal(env.controller.gait_sets.posture.weight, weight)
 
 
 def test_a_step_length_is_commanded():
