@@ -165,7 +165,7 @@ def test_kicks_have_a_column_each_and_levels_tables_of_their_own(tmp_path: Path)
     write_leaderboard([one, OTHER, changed(tmp_path / "b.json", namesake, later)], page)
     ideal, field = page.read_text().split("## Realism level `field`")
     head, _, *ranked = rows(ideal)
-    assert head[7:9] == ["kicked 1 m/s", "kicked 3 m/s"]
+    assert head[6:8] == ["kicked 1 m/s", "kicked 3 m/s"]
     assert {row[1]: row[7:9] for row in ranked[:2]} == {
         "`walk`": ["18 of 20", "5 of 20"], "`walk-spring`": ["–", "–"]}  # fmt: skip
     assert [row[:2] for row in rows(field)[2:3]] == [["1", "`walk`"]]
