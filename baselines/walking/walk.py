@@ -103,7 +103,7 @@ class Walk(Commanded, CaptureStep):
     @property
     def walking(self) -> bool:
         """True from the first shift of weight until the walk has stopped."""
-        return bool(self.gait.walking[0])
+        return bool(self.gait.walking)
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with the limits of this robot for a command out of its reach."""
@@ -145,10 +145,8 @@ class Walk(Commanded, CaptureStep):
         """Forget the last trial, its command too."""
         super().reset(state)
         self.gait_sets.reset()
-        for member in self.gait.members():
-            if isinstance(member, np.ndarray):
-                member[...] = 0
-        self.gait.treads.leaning[:] = 0.0
+        self.gait.clear()
+        self.gait.treads.leaning = 0.0
 
     def block(self, state: RobotState, targets: Targets) -> WalkTick:
         """See `CaptureStep`."""

@@ -1,7 +1,6 @@
 """Balance with feet fixed while this suffices; then steps to where the capture point can stop."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -144,9 +143,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         super().reset(state)
         self.sets.reset()
         self.offsets.clear()
-        for array in self.memory.members():
-            array[...] = 0
-        self.memory.foot[0] = -1
+        self.memory.clear()
+        self.memory.foot = -1
         stop_recentring(self.recentring)
         self.memory.level_frame[:] = np.eye(3)
         self._failures[0] = 0
@@ -154,25 +152,25 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     @property
     def steps(self) -> int:
         """The number of steps begun since the reset."""
-        return int(self.memory.steps[0])
+        return self.memory.steps
 
     @property
     def foot(self) -> int:
         """The foot that stepped last; −1: none."""
-        return int(self.memory.foot[0])
+        return self.memory.foot
 
     @property
     def swing(self) -> Swing | None:
         """The swing in progress, or None when both feet are down; ticks write into it."""
-        return self._swing if self.memory.swinging[0] else None
+        return self._swing if self.memory.swinging else None
 
     def stepping(self) -> Stepping:
         """The step in progress, see `Stepping`."""
         swing = self.swing
         if swing is None:
-            return STANDING._replace(steps=self.steps, since=float(self.memory.clock[0]))
+            return STANDING._replace(steps=self.steps, since=self.memory.clock)
         point, foothold = swing.reference[0].copy(), swing.foothold.copy()
-        phase = float(swing.time[0]) / float(swing.duration[0])
+        phase = swing.time / swing.duration
         return Stepping(self.steps, self.foot, point, foothold, phase, time_left(swing), 0.0)
 
     def tick(self, state: RobotState, targets: Targets) -> CaptureTick:
@@ -186,7 +184,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             blocks = self.blocks(state, targets)
             standing = address_of(momentum_tick, blocks.standing)
             contacts = address_of(contact_tick, blocks.on_both)
-            known = self._tick = replace(blocks, standing_kernel=standing, contact_kernel=contacts)
+            known = self._tick = blocks.replace(standing_kernel=standing, contact_kernel=contacts)
         return known
 
     def blocks(self, state: RobotState, targets: Targets) -> CaptureTick:

@@ -116,20 +116,20 @@ def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.
 def follow_model(t: WalkTick) -> None:
     """Let the height be what the reference model answers."""
     c, r, s, own, g = t.walk, t.reference, t.walk.state, t.walk.reference_out, t.gait
-    new, level = c.memory.foot[0], c.memory.level_frame
-    if c.memory.swinging[0]:
+    new, level = c.memory.foot, c.memory.level_frame
+    if c.memory.swinging:
         share_load(r, 1 - new, 1.0, np.inf)
-        r.time_left[0] = time_left(c.swing)
+        r.time_left = time_left(c.swing)
         r.landing[0], r.landing[1] = c.swing.foothold[0], c.swing.foothold[1]
     else:
-        duration = np.inf if g.starting[0] else g.transfer_time
-        share_load(r, new, 0.5 if g.starting[0] else g.clock[0] / duration, duration)
-        r.time_left[0] = max(g.transfer_time - g.clock[0], 0.0)
+        duration = np.inf if g.starting else g.transfer_time
+        share_load(r, new, 0.5 if g.starting else g.clock / duration, duration)
+        r.time_left = max(g.transfer_time - g.clock, 0.0)
     r.ahead[0], r.ahead[1] = level[0, 0], level[1, 0]
     for a in range(2):
         r.com_vel[a], r.com_acc[a], r.cop[a] = s.com_vel[a], own.com_acc[a], own.cop[a]
     run(t.model)
-    r.begun[0] = 1
+    r.begun = 1
     own.com[2] = s.com[2] + r.height[0] + c.offsets[targets.COM_Z]
     own.com_vel[2], own.com_acc[2] = r.height[1], r.height[2]
 
@@ -138,7 +138,7 @@ def follow_model(t: WalkTick) -> None:
 def plan_cop(t: WalkTick) -> None:
     """The CoP of the stance sole that brings ξ to the end of a regular step, into `gait.cop`."""
     c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
-    foot, level, xi = c.memory.foot[0], c.memory.level_frame, c.state.capture_point
+    foot, level, xi = c.memory.foot, c.memory.level_frame, c.state.capture_point
     stance = c.state.sole_point[1 - foot]
     n = single_support_region(
         t.walk.search.region, 1 - foot, stance, level[0, 0], level[1, 0], c.corners
@@ -160,14 +160,14 @@ def foothold_after(t: WalkTick, time: float) -> float:
     """The foothold for a touchdown after `time` [s], into `search.foothold`; how far limits keep it
     from the one desired [m]."""
     c, g, q, omega = t.walk, t.gait, t.walk.search, t.walk.state.omega[0]
-    foot, xi = c.memory.foot[0], c.state.capture_point
+    foot, xi = c.memory.foot, c.state.capture_point
     factor, growth = transfer_factor(omega, g.transfer_time), np.exp(omega * time)
     offset = offset_from(t, 1 - foot)
     for a in range(2):
         end = g.cop[a] + (xi[a] - g.cop[a]) * growth - t.stance[a]
         way = step_to_offset(end, offset[a], factor, omega, g.transfer_time)
         c.pair[a] = t.stance[a] + way - t.swinging[a]
-    q.time[0] = time
+    q.time = time
     x, y = to_step_frame(q, c.pair[0], c.pair[1])
     x, y = x + c.offsets[targets.FOOTHOLD_X], y + c.offsets[targets.FOOTHOLD_Y]
     near_x, near_y = clip_to_limits(q, x, y, least_width(t))
@@ -179,8 +179,8 @@ def foothold_after(t: WalkTick, time: float) -> float:
 def plan_foothold(t: WalkTick) -> None:
     """Lead the swing to the foothold and the time that cost least."""
     c, g, q, w = t.walk, t.gait, t.walk.search, t.walk.swing
-    foot, planned = c.memory.foot[0], time_left(c.swing)
-    q.foot[0] = foot
+    foot, planned = c.memory.foot, time_left(c.swing)
+    q.foot = foot
     put_middle(t, foot, t.swinging)
     for a in range(2):
         t.swinging[a] -= c.state.sole_point[foot, a]
@@ -190,30 +190,30 @@ def plan_foothold(t: WalkTick) -> None:
         w.reference[0, 0] + coasting * w.reference[1, 0],
         w.reference[0, 1] + coasting * w.reference[1, 1],
     )
-    low = max(q.time_min - w.time[0], FROZEN)
-    high = max(max(q.time_max, step_time(g)) - w.time[0], low)  # a command may ask for more
+    low = max(q.time_min - w.time, FROZEN)
+    high = max(max(q.time_max, step_time(g)) - w.time, low)  # a command may ask for more
     best, best_x, best_y, best_time = np.inf, 0.0, 0.0, planned
-    ground = w.ground[0]
+    ground = w.ground
     for k in range(TIMES + 1):
         time = planned if k == 0 else low + (high - low) * (k - 1) / (TIMES - 1)
         regular = step_time(g) + c.offsets[targets.TIME]
-        cost = foothold_after(t, time) + g.time_price * abs(w.time[0] + time - regular)
+        cost = foothold_after(t, time) + g.time_price * abs(w.time + time - regular)
         if footholds_given(t):
             cost += settle_on_tread(t, foot)
         if cost < best:
             best, best_time = cost, time
             best_x, best_y = q.foothold[0], q.foothold[1]
             if footholds_given(t):
-                ground = g.treads.target[0]
-    aim_swing(w, best_x, best_y, w.time[0] + best_time)
-    w.ground[0] = ground
+                ground = g.treads.target
+    aim_swing(w, best_x, best_y, w.time + best_time)
+    w.ground = ground
 
 
 @compiled
 def swing_tick(t: WalkTick) -> None:
     """A tick on one foot."""
     c, g, w = t.walk, t.gait, t.walk.swing
-    foot = c.memory.foot[0]
+    foot = c.memory.foot
     plan_cop(t)
     if time_left(w) > FROZEN:
         plan_foothold(t)
@@ -222,7 +222,7 @@ def swing_tick(t: WalkTick) -> None:
     if footholds_given(t):
         advance_over_edges(t)
     elif g.lower > 0.0:
-        top = max(w.ground[0], g.treads.left[2]) + apex_of_step(t)
+        top = max(w.ground, g.treads.left[2]) + apex_of_step(t)
         advance_high(w, top, g.lower, c.gains.period)
     else:
         advance_over(w, apex_of_step(t), c.gains.period)

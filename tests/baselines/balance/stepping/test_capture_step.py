@@ -162,7 +162,7 @@ def test_a_foot_gives_its_load_away_before_it_lifts_off():
     """While it unloads, its part of the planned force falls; then the foot is no contact."""
 
     def look(c, *_):
-        unloading = c.swing is not None and c.swing.time[0] == 0.0
+        unloading = c.swing is not None and c.swing.time == 0.0
         return c.sets.sets[0, 1].workspace.wrenches[6 * c.foot + 2] if unloading else np.nan
 
     controller = load_controller("capture-step", robot())
@@ -216,14 +216,14 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
                 raised[0] = planner.added(state, c.foot, yaw)[3]
             left[0] = time_left(c.swing)
         else:
-            if c.recentring.stage[0] == SHIFTING and stages[-1] != SHIFTING:
+            if c.recentring.stage == SHIFTING and stages[-1] != SHIFTING:
                 stood.clear()  # another heading from now on
             stood.append(feet.copy())
             left[0] = np.inf
             region, overreach = regions.both(stood[0], yaw), c.config.cop_overreach
             ground, stride = feet[:, 2].mean(), feet[0, :2] - feet[1, :2]
         kinds.add(c.swing is not None)
-        stages.append(int(c.recentring.stage[0]))
+        stages.append(int(c.recentring.stage))
         expected = readable.guided(c, state, targets, region, overreach, ground, stride, raised[0])
         for entry, value in expected.items():
             np.testing.assert_allclose(

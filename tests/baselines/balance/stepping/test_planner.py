@@ -80,7 +80,7 @@ def test_a_running_step_is_planned_as_by_the_readable_planner(offset, feedback):
         state, yaw, rng = falling(seed)
         foot = seed % 2
         swing = swing_at(state.sole_points[foot], 0.35, SwingTask(), robot().units)
-        swing.time_offset[0] = offset
+        swing.time_offset = offset
         planned.aim(swing, state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
         for _ in range(rng.integers(1, 60)):
             planned.advance(swing, 0.004)
