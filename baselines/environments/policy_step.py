@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import Motion, update_targets
+from poise.baselines.balance.references.targets import Motion, Offsets, update_targets
 from poise.baselines.balance.references.tempo import motion_time_of
 from poise.baselines.controller import Outputs, TargetArrays
 from poise.envs.balance.episode import (
@@ -49,7 +49,7 @@ class Residual(Block):
     scale: np.ndarray  # (na,) the offset that it moves by 1
     blend: float  # of the way that a policy step goes from the last action to the next
     gate: float  # [m] see `gate_opening`
-    offsets: np.ndarray  # (9,), 13 with steps: see `update_targets`
+    offsets: Offsets  # of which it moves a part
     torque_scale: np.ndarray  # (nu,) [N·m] what the last nu entries add by 1; (0,): they do not
     torques: np.ndarray  # (nu,) [N·m] that they add
 
@@ -83,7 +83,7 @@ def set_offsets(r: Residual, s: StateArrays, motion: Motion, com_offset: float, 
         for a in range(first + motors):
             e.action[a] = e.last_action[a] + r.blend * (e.action[a] - e.last_action[a])
     for a in range(first):
-        r.offsets[r.moved[a]] = opened * r.scale[a] * e.action[a]
+        r.offsets.values[r.moved[a]] = opened * r.scale[a] * e.action[a]
     for i in range(motors):
         r.torques[i] = opened * r.torque_scale[i] * e.action[first + i]
 

@@ -235,7 +235,7 @@ class ResidualBalanceEnv(ControlledEnv):
             options = {**options, "command": command_options(self.motion.commands)}
         self._begin_walk(options)
         self._motion.pace.clear()
-        self._offsets[:] = 0.0
+        self._offsets.clear()
         self._residual.torques[:] = 0.0
         forget_pushes(self._push_force)
         set_targets(self._target_inputs())

@@ -73,7 +73,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         super()._accept(controller, base)
         self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
-        self._offsets = stepper.offsets.values  # one array is both
+        self._offsets = stepper.offsets
         self._residual = replace(self._residual, offsets=self._offsets)
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:

@@ -2,12 +2,10 @@
 
 from dataclasses import dataclass
 from typing import Annotated
-from typing import Annotated
 
 import numpy as np
 
 from poise.baselines.balance.references.targets import Motion
-from poise.baselines.balance.stepping.controller import Stepping
 from poise.baselines.balance.stepping.controller import Stepping
 from poise.baselines.balance.stepping.planning.blocks import StepMemory
 from poise.baselines.balance.stepping.planning.swing import Swing
@@ -16,7 +14,6 @@ from poise.envs.balance.mdp.observation import GROUND, SPACE, Terms, View
 from poise.envs.balance.mdp.terms import TERMS, put_local
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.mutable import Mutable
 from poise.envs.compiled.mutable import Mutable
 from poise.envs.sensing.push_force import PushForce
 

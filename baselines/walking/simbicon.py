@@ -138,7 +138,7 @@ class Simbicon(Commanded, BaseController):
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial, its command too."""
         g = self.gait
-        for member in (g.command, g.velocity, g.error, g.planned, g.step_clock):
+        for member in (g.command, g.velocity, g.error, g.planned):
             member[:] = 0.0
         g.walking, g.step_clock = 1, -1.0
         self.stage = 0  #: 0 and 1: the left foot lifts and is lowered; 2 and 3: the right one

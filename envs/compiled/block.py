@@ -154,6 +154,16 @@ class Block:
         return type(self)(*self.members())
 
 
+def named_entries(kind: type[Block]) -> tuple[np.ndarray, ...]:
+    """Members of a block whose first one is an array of zeros, and all others are its entries.
+
+    Code that needs a vector takes the array, and code that needs one entry its name.
+    """
+    names = list(kind.mutable)
+    values = guarded_zeros(len(names))
+    return values, *(values[i : i + 1] for i in range(len(names)))
+
+
 def _length(part: int | str, sizes: Mapping[str, int]) -> int:
     """The number that a part of an annotated shape stands for."""
     if isinstance(part, int):

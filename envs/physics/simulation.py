@@ -15,7 +15,7 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
 from poise.envs.physics.engines.engine import Engine
 from poise.envs.physics.pushes.push import Kick, Push
-from poise.envs.physics.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
+from poise.envs.physics.pushes.table import ROW, apply_kicks, apply_pushes, pack
 from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews, robot_arrays, sim_views
@@ -97,7 +97,7 @@ class Simulation(Copyable):
         self.clock = Clock(0)
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
-        self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
+        self.push_table = guarded_zeros(SOME_PUSHES, ROW)
         self._engine = Engine(robot, self.data)
         self._world: World | None = None
         self.equip(Program.of(()), Program.of(()), ideal_bus())
@@ -181,8 +181,8 @@ class Simulation(Copyable):
         self.pushes = tuple(pushes)
         table = pack(self.pushes, self.robot, self.start_yaw)
         if len(table) > len(self.push_table):  # seldom: compiled code is bound to the table
-            self.push_table = guarded_zeros((2 * len(table), TABLE_COLUMNS))
-        self.push_table[:] = 0.0
+            self.push_table = guarded_zeros(2 * len(table), ROW)
+        self.push_table[:] = np.zeros((), ROW)
         self.push_table[: len(table)] = table
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:

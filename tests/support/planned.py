@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
-from poise.baselines.balance.stepping.controller import StepOffsets
+from poise.baselines.balance.references.targets import no_offsets
 from poise.baselines.balance.stepping.planning.blocks import Search
 from poise.baselines.balance.stepping.planning.config import (
     PivotConfig,
@@ -34,7 +34,7 @@ class Planner:
 
     def __init__(self, robot, limits, choice, feedback=None, falls=None, **rule):
         self.robot, self.limits, self.choice, self.units = robot, limits, choice, robot.units
-        self.region, self.offsets = cop_region(robot), StepOffsets()
+        self.region, self.offsets = cop_region(robot), no_offsets()
         self.foot_sign = foot_signs(robot)
         self.feedback = feedback_arrays(
             robot, feedback or StepFeedback(), falls or {}, PivotConfig()
@@ -53,7 +53,7 @@ class Planner:
         """The search for steps from a state."""
         return make_search(
             self.robot, state.arrays, self.region, self.limits, self.choice, self.feedback,
-            self.offsets.values, **self.further,
+            self.offsets, **self.further,
         )  # fmt: skip
 
 

@@ -7,7 +7,6 @@ from poise.baselines.balance.stepping.planning.cop_region import (
     LOAD_FRACTIONS,
     rest_ahead,
 )
-from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import LOADING, SHIFTING
 from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.envs.compiled.maths.polygons import nearest_inside
@@ -102,7 +101,7 @@ class ReadablePlanner:
         """Take the gains of where the body falls: each linear in the angle from the heading."""
         f, (ahead, left) = self.planner.feedback, turn(yaw).T @ state.com_vel[:2]
         self.gains = f.always.copy()
-        if f.signals[LATER_STEP] == 0.0 and len(f.angles):
+        if f.signals.later_step == 0.0 and len(f.angles):
             angle = np.arctan2(abs(left), ahead)
             for i, k in np.ndindex(f.always.shape):
                 self.gains[i, k] += np.interp(angle, f.angles, f.added_at[:, i, k])
@@ -117,7 +116,7 @@ class ReadablePlanner:
         lean = R.T @ (state.root_axes @ standing.T @ [0.0, 0.0, 1.0])[:2]
         L = state.arrays.momentum[3:5]
         spin = R.T @ [L[1], -L[0]] * self.omega / (robot.mass * robot.gravity * self.h)
-        signals = [1.0, f.signals[LATER_STEP], self.phase, *out * capture, *out * lean, *out * spin]
+        signals = [1.0, f.signals.later_step, self.phase, *out * capture, *out * lean, *out * spin]
         return self.gains @ signals
 
     def plan(self, state, yaw):

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.balance.references.targets import no_offsets
 from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
@@ -20,7 +21,7 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .controller import STANDING, StepOffsets, Stepping, SteppingController
+from .controller import STANDING, Stepping, SteppingController
 from .planning.blocks import CaptureTick, Search, StepGains, StepMemory
 from .planning.config import CaptureStepConfig, StepLimits
 from .planning.cop_region import CopRegion, cop_region, rest_ahead
@@ -99,7 +100,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self.region = cop_region(robot, self.config.region_fraction)
         c = self.config
         self._step_limits = possible_limits(robot, c.limits, c.swing, c.step_qp.torque.share)
-        self.offsets = StepOffsets()  #: what a policy adds
+        self.offsets = no_offsets()  #: what a policy adds
         self.feedback = feedback_arrays(robot, c.feedback, c.falls, c.pivot)
         self._swing = swing_at(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)
@@ -211,7 +212,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             swing=self._swing,
             memory=self.memory,
             recentring=self.recentring,
-            offsets=self.offsets.values,
+            offsets=self.offsets,
             **ticks,
             standing=self.qp.tick(state, targets),
             tau=self.tau,
@@ -228,7 +229,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             return known.search
         return make_search(
             self.robot, s, self.region, self._step_limits or c.limits, c.foothold, self.feedback,
-            self.offsets.values, self.foothold_rule, self._arc,
+            self.offsets, self.foothold_rule, self._arc,
         )  # fmt: skip
 
     def block(self, state: RobotState, targets: Targets) -> Block:

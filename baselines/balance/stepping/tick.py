@@ -5,7 +5,6 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import TRIGGER
 from poise.baselines.whole_body.compensation import watch
 from poise.baselines.whole_body.tick import ContactTick, go_on_from
 from poise.envs.compiled.calls import call
@@ -15,7 +14,6 @@ from poise.envs.physics.kinematics import borne_weight
 
 from .planning.blocks import CaptureTick
 from .planning.cop_region import distance_beyond, double_support_region, single_support_region
-from .planning.feedback import LATER_STEP, LX, LY
 from .planning.guidance import (
     copy_reference,
     crouch,
@@ -63,14 +61,14 @@ def must_step(t: CaptureTick) -> bool:
         outside = distance_beyond(
             q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
         )
-        return outside > g.restep_margin + t.offsets[TRIGGER]
+        return outside > g.restep_margin + t.offsets.trigger
     x, y = s.capture_point[0], s.capture_point[1]
     cos, sin = s.heading[0], s.heading[1]
     outside = distance_beyond(
         q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
     )
     x, y = x - s.origin[0], y - s.origin[1]  # of the fall
-    turning = (x * s.momentum[LY] - y * s.momentum[LX]) / max(np.sqrt(x * x + y * y), 1e-9)
+    turning = (x * s.momentum[4] - y * s.momentum[3]) / max(np.sqrt(x * x + y * y), 1e-9)
     margin = g.step_margin
     if moves(t):
         angle, rate = turned_away(t)
@@ -79,7 +77,7 @@ def must_step(t: CaptureTick) -> bool:
         if rate > AWAY and angle + lead * rate > g.turn_limit:
             return True
         margin += g.crouch_margin * low * max(1.0 - (angle / g.turn_limit) ** 2, 0.0)
-    return outside + g.momentum_gain * turning > margin + t.offsets[TRIGGER]
+    return outside + g.momentum_gain * turning > margin + t.offsets.trigger
 
 
 @compiled
@@ -93,7 +91,7 @@ def begin_step(t: CaptureTick, to_nominal: bool) -> None:
     if m.recovering == 0:
         set_level_frame(m.level_frame, s.heading[0], s.heading[1])
     q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
-    q.feedback.signals[LATER_STEP] = 1.0 if m.recovering > 0 else 0.0
+    q.feedback.signals.later_step = 1.0 if m.recovering > 0 else 0.0
     if to_nominal:
         plan_recentring(q, t.recentring)
     else:

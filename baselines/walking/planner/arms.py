@@ -19,7 +19,6 @@ from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
 from .blocks import Arms, WalkTick
-from .command import ARM_SWING
 
 ROLES = ("shoulder_pitch_right", "shoulder_pitch_left")  # of foot sign −1, +1
 LEAST_STEP = 0.15  # [h] for the whole swing
@@ -88,7 +87,7 @@ def feet_apart(t: WalkTick, order: int) -> float:
 def swing_arms(t: WalkTick, period: float) -> None:
     """Add the swing that is commanded to the posture's references; a step takes `period` [s]."""
     arms, own, g = t.arms, t.walk.reference_out, t.gait
-    weight, amplitude = t.walk.on_both.problem.parameters.accel_weight, g.command[ARM_SWING]
+    weight, amplitude = t.walk.on_both.problem.parameters.accel_weight, g.commanded_arm_swing
     if amplitude <= 0.0:
         if arms.swinging:
             copy_into(arms.free_weight, weight)

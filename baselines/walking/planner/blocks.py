@@ -12,14 +12,12 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.mutable import Mutable
 
-from .command import ENTRIES
-
 
 @dataclass(eq=False)
 class Treads(Block):
     """The surfaces on which footholds are given, and how the foot swings between them."""
 
-    surfaces: np.ndarray  # (n, 6) see `Surface`; none: footholds are free
+    surfaces: np.ndarray  # (n,) see `surface_arrays`; none: footholds are free
     margin: float  # [m]
     least_step: float  # [m]
     approach: float  # [m]
@@ -57,7 +55,12 @@ class Gait(Block):
     speed_margin: float  # [m/s]
     time_min: float  # of a step, whatever the command says [s]
     lower: float  # from when a swinging foot comes down [of the swing]; 0: once it is up
-    command: Annotated[np.ndarray, ENTRIES]  # see `GaitCommand.array`
+    command: np.ndarray  # (8,) see `GaitCommand.array`; those that follow are its entries
+    commanded_step_time: Mutable[float]  # [s]; 0 here and below: the gait's own
+    commanded_width: Mutable[float]  # [m]
+    commanded_clearance: Mutable[float]  # [m]
+    commanded_arm_swing: Mutable[float]  # [rad]
+    commanded_step_length: Mutable[float]  # [m]
     velocity: Annotated[np.ndarray, 3]  # ahead, left, turn, which follow the command
     error: Annotated[np.ndarray, 2]  # what the sum of the velocity's errors adds to it [m/s]
     planned: Annotated[np.ndarray, 2]  # the velocity with it [m/s]

@@ -5,7 +5,6 @@ The law of the footholds is that of `dcm.py`.
 
 import numpy as np
 
-from poise.baselines.balance.references import targets
 from poise.baselines.balance.stepping.planning.cop_region import single_support_region
 from poise.baselines.balance.stepping.planning.guidance import limit_posture
 from poise.baselines.balance.stepping.planning.search import (
@@ -30,7 +29,7 @@ from poise.envs.compiled.maths.vectors import turned
 
 from .arms import swing_arms
 from .blocks import Gait, WalkTick
-from .command import MOST_STEP_TIME, STEP_LENGTH, STEP_TIME, WIDTH
+from .command import MOST_STEP_TIME
 from .dcm import constant_cop, gait_offset, step_to_offset, touchdown_target, transfer_factor
 from .treads import advance_over_edges, apex_of_step, follow_line, footholds_given, settle_on_tread
 
@@ -42,10 +41,10 @@ LEAST_TIME = 0.06  # [s] for which the CoP on one foot is planned at least
 @compiled
 def step_time(g: Gait) -> float:
     """T [s]: as commanded, or the gait's own; no shorter than the legs can."""
-    wanted = g.command[STEP_TIME] if g.command[STEP_TIME] > 0.0 else g.step_time
-    if g.command[STEP_LENGTH] > 0.0:
+    wanted = g.commanded_step_time if g.commanded_step_time > 0.0 else g.step_time
+    if g.commanded_step_length > 0.0:
         speed = np.sqrt(g.command[0] * g.command[0] + g.command[1] * g.command[1])
-        period = g.command[STEP_LENGTH] / max(speed, 1e-9)
+        period = g.commanded_step_length / max(speed, 1e-9)
         wanted = min(period - g.transfer_time, MOST_STEP_TIME)
     return max(wanted, g.time_min)
 
@@ -53,7 +52,7 @@ def step_time(g: Gait) -> float:
 @compiled
 def least_width(t: WalkTick) -> float:
     """The least distance of the feet across the heading [m]; less where a command asks for it."""
-    least, wanted = t.walk.search.width_min, t.gait.command[WIDTH]
+    least, wanted = t.walk.search.width_min, t.gait.commanded_width
     return min(least, wanted - ROOM) if wanted > 0.0 else least
 
 
@@ -62,7 +61,7 @@ def step_width(t: WalkTick) -> float:
     """W [m]: wider where steps to the side need it, so that the feet do not meet."""
     g = t.gait
     way = abs(g.velocity[1]) * (step_time(g) + g.transfer_time)
-    wanted = g.command[WIDTH] if g.command[WIDTH] > 0.0 else g.width
+    wanted = g.commanded_width if g.commanded_width > 0.0 else g.width
     return max(wanted, least_width(t) + way + ROOM)
 
 
@@ -74,9 +73,7 @@ def offset_from(t: WalkTick, swinging: int) -> tuple[float, float]:
     x, y = gait_offset(
         c.state.omega[0], step_time(g), g.transfer_time, g.planned[0], g.planned[1], outward
     )
-    return turned(
-        level[0, 0], level[1, 0], x + c.offsets[targets.COM_X], y + c.offsets[targets.COM_Y]
-    )
+    return turned(level[0, 0], level[1, 0], x + c.offsets.com[0], y + c.offsets.com[1])
 
 
 @compiled
@@ -96,16 +93,16 @@ def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.
     half, length = 0.25 * (stride_x * stride_x + stride_y * stride_y), c.gains.leg_length
     height = min(t.gait.height, np.sqrt(max(length * length - half, 0.0)))
     cos, sin = c.memory.level_frame[0, 0], c.memory.level_frame[1, 0]
-    dx, dy = turned(cos, sin, offsets[targets.COP_X], offsets[targets.COP_Y])
+    dx, dy = turned(cos, sin, offsets.cop[0], offsets.cop[1])
     rate = s.omega[0] * s.omega[0]
     own.cop[0], own.cop[1] = p[0] + dx, p[1] + dy
     for a in range(2):
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
         own.com_acc[a] = rate * (s.com[a] - own.cop[a])
-    own.com[2] = ground + height + offsets[targets.COM_Z]
+    own.com[2] = ground + height + offsets.height
     own.com_vel[2] = own.com_acc[2] = 0.0
     if footholds_given(t):
-        follow_line(t, height + offsets[targets.COM_Z])
+        follow_line(t, height + offsets.height)
     elif not t.constant_height:
         follow_model(t)
     limit_posture(c)
@@ -130,7 +127,7 @@ def follow_model(t: WalkTick) -> None:
         r.com_vel[a], r.com_acc[a], r.cop[a] = s.com_vel[a], own.com_acc[a], own.cop[a]
     run(t.model)
     r.begun = 1
-    own.com[2] = s.com[2] + r.height[0] + c.offsets[targets.COM_Z]
+    own.com[2] = s.com[2] + r.height[0] + c.offsets.height
     own.com_vel[2], own.com_acc[2] = r.height[1], r.height[2]
 
 
@@ -169,7 +166,7 @@ def foothold_after(t: WalkTick, time: float) -> float:
         c.pair[a] = t.stance[a] + way - t.swinging[a]
     q.time = time
     x, y = to_step_frame(q, c.pair[0], c.pair[1])
-    x, y = x + c.offsets[targets.FOOTHOLD_X], y + c.offsets[targets.FOOTHOLD_Y]
+    x, y = x + c.offsets.foothold[0], y + c.offsets.foothold[1]
     near_x, near_y = clip_to_limits(q, x, y, least_width(t))
     q.foothold[0], q.foothold[1] = to_world(q, near_x, near_y)
     return np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
@@ -196,7 +193,7 @@ def plan_foothold(t: WalkTick) -> None:
     ground = w.ground
     for k in range(TIMES + 1):
         time = planned if k == 0 else low + (high - low) * (k - 1) / (TIMES - 1)
-        regular = step_time(g) + c.offsets[targets.TIME]
+        regular = step_time(g) + c.offsets.time
         cost = foothold_after(t, time) + g.time_price * abs(w.time + time - regular)
         if footholds_given(t):
             cost += settle_on_tread(t, foot)

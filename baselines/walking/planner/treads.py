@@ -10,10 +10,9 @@ import numpy as np
 from poise.baselines.balance.stepping.planning.swing import quintic, time_left
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import turned
-from poise.envs.terrain.arrays import X_MAX, X_MIN, surface_below, surface_height
+from poise.envs.terrain.arrays import surface_below, surface_height
 
 from .blocks import Treads, WalkTick
-from .command import CLEARANCE
 
 FREE = 1.0  # [m] a surface that is longer leaves footholds free: several steps fit on it
 SIDE_BY_SIDE = 0.08  # [m] between feet that are not one behind the other
@@ -48,7 +47,7 @@ def put_room(t: WalkTick, foot: int) -> None:
 @compiled
 def is_free(r: Treads, i: int) -> bool:
     """Return whether a surface leaves footholds free."""
-    return r.surfaces[i, X_MAX] - r.surfaces[i, X_MIN] > FREE
+    return r.surfaces[i].x_max - r.surfaces[i].x_min > FREE
 
 
 @compiled
@@ -60,7 +59,7 @@ def settle_on_tread(t: WalkTick, foot: int) -> float:
     put_room(t, foot)
     nearest, moved, found = NOT_HELD, place[0], False
     for i in range(r.surfaces.shape[0]):
-        low, high = r.surfaces[i, X_MIN] + r.room[0], r.surfaces[i, X_MAX] - r.room[1]
+        low, high = r.surfaces[i].x_min + r.room[0], r.surfaces[i].x_max - r.room[1]
         x = min(max(place[0], low), high)
         z = surface_height(r.surfaces, i, 0.0, x)
         way = abs(x - place[0]) + (0.0 if i == r.aim else OTHER)
@@ -79,8 +78,8 @@ def first_place(r: Treads, i: int) -> float:
     """Where a sole goes on surface `i` that comes from before it: its middle, or, of a long one,
     near its edge [m]."""
     if is_free(r, i):
-        return r.surfaces[i, X_MIN] + r.room[0] + r.margin
-    return 0.5 * (r.surfaces[i, X_MIN] + r.surfaces[i, X_MAX])
+        return r.surfaces[i].x_min + r.room[0] + r.margin
+    return 0.5 * (r.surfaces[i].x_min + r.surfaces[i].x_max)
 
 
 @compiled
@@ -119,7 +118,7 @@ def rise_near(r: Treads, place: np.ndarray) -> float:
     for k in (i, i + 1):  # the edge between surfaces k − 1 and k
         if k < 1 or k >= r.surfaces.shape[0]:
             continue
-        edge = r.surfaces[k, X_MIN]
+        edge = r.surfaces[k].x_min
         if abs(edge - place[0]) > r.approach:
             continue
         before = surface_height(r.surfaces, k - 1, 0.0, edge)
@@ -196,7 +195,7 @@ def _lead(t: WalkTick, a: int, place: float, speed: float, until: float) -> None
 @compiled
 def apex_of_step(t: WalkTick) -> float:
     """How high a step on one surface lifts the sole [m]: as commanded, or the gait's own."""
-    wanted = t.gait.command[CLEARANCE]
+    wanted = t.gait.commanded_clearance
     return wanted if wanted > 0.0 else t.walk.swing.apex
 
 
@@ -212,7 +211,7 @@ def advance_over_edges(t: WalkTick) -> None:
     way = DOWN if end < start - LEVEL else UP
     hold, arrive, rise = r.hold[way] * whole, r.arrive * whole, r.rise[way] * whole
     lower, apex = r.lower[way] * whole, max(start, end, between)
-    apex += max(r.clearance, t.gait.command[CLEARANCE])
+    apex += max(r.clearance, t.gait.commanded_clearance)
     if plain:
         hold, arrive, rise, lower = 0.0, whole, w.lift * whole, w.lift * whole
         apex = end + apex_of_step(t)

@@ -64,7 +64,7 @@ class View(Block):
     action: np.ndarray  # (na,) of the policy step that has just ended
     views: SimViews  # the true robot: what the policy sent it (`ctrl`), what a teacher may see
     clock: Clock
-    pushes: np.ndarray  # (k, 11) of the episode, see `pack`; rows of zeros are none
+    pushes: np.ndarray  # (k,) of the episode, see `pack`; rows of zeros are none
     out: np.ndarray  # (size,) the term's own entries
 
 

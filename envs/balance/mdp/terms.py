@@ -14,7 +14,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along
 from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.kinematics import StateArrays
-from poise.envs.physics.pushes.table import DURATION, FORCE, HALF_SINE, KIND, PROFILE, PUSH, START
+from poise.envs.physics.pushes.table import HALF_SINE, PUSH
 from poise.envs.sensing.measurement import Rings, arrived
 
 from .observation import GROUND, SPACE, Terms, View
@@ -140,11 +140,11 @@ def push(v: View):
     v.out[:] = 0.0
     for k in range(v.pushes.shape[0]):
         row = v.pushes[k]
-        age, duration = now - row[START], row[DURATION]
-        if row[KIND] == PUSH and 0.0 <= age < duration:
-            fraction = np.sin(np.pi * age / duration) if row[PROFILE] == HALF_SINE else 1.0
+        age, duration, force = now - row.start, row.duration, row.force
+        if row.kind == PUSH and 0.0 <= age < duration:
+            fraction = np.sin(np.pi * age / duration) if row.profile == HALF_SINE else 1.0
             for a in range(3):
-                v.out[a] += fraction * row[FORCE + a]
+                v.out[a] += fraction * force[a]
     put_local(v.state, v.out[0], v.out[1], v.scales.weight, v.out)
     v.out[2] /= v.scales.weight
 

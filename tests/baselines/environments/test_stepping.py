@@ -171,7 +171,7 @@ def test_rest_after_a_step_is_moved(env):
     anywhere = 9.0 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     tick, seen = controller.tick(state, env.targets), []
     for shift in ([0.0, 0.0], [0.1, -0.05]):
-        controller.offsets.com = shift
+        controller.offsets.com[:] = shift
         copy_reference(tick)
         guide_com(tick, anywhere, 0.0, 0.0, 0.0, 0.0)
         seen.append(tick.reference_out.com_acc[:2].copy())

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
+from poise.baselines.balance.references.targets import Offsets
 from poise.baselines.controller import TargetArrays
 from poise.baselines.whole_body.momentum_qp import Tick
 from poise.baselines.whole_body.tick import ContactTick
@@ -31,7 +32,7 @@ class Search(Block):
 
     state: StateArrays
     region: CopRegion
-    offsets: np.ndarray  # (13,) see `StepOffsets`
+    offsets: Offsets
     feedback: FeedbackArrays
     heading: Annotated[np.ndarray, 2]  # cosine and sine of the step's heading
     foot_sign: np.ndarray  # (2,) 1 for the left foot, −1 for the right one
@@ -144,7 +145,7 @@ class CaptureTick(Block):
     swing: Swing
     memory: StepMemory
     recentring: Recentring
-    offsets: np.ndarray  # (13,) see `StepOffsets`
+    offsets: Offsets
     on_first: ContactTick  # QP with the first sole in contact
     on_second: ContactTick  # QP with the second sole in contact
     on_both: ContactTick  # QP with both soles in contact

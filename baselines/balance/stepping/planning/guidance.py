@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from poise.baselines.balance.references import targets
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import copy_into, rotated, rotation_error, turn_error, turned
 
 from .blocks import CaptureTick
-from .feedback import HEIGHT, STANCE, SWING, pivot_offset
+from .feedback import pivot_offset
 from .recentring import LOADING, SHIFTING, limit_cop_distance
 from .search import set_capture_point
 
@@ -20,7 +19,7 @@ UPRIGHT = 0.95  # [h] a motion that has the CoM lower crouches
 @compiled
 def crouch(t: CaptureTick) -> float:
     """How far below 0.95 h the motion has the CoM [m]; 0 where it stands."""
-    height = t.reference_in.com[2] - t.state.origin[2] - t.offsets[targets.COM_Z]
+    height = t.reference_in.com[2] - t.state.origin[2] - t.offsets.height
     return max(UPRIGHT * t.robot.height_com - height, 0.0)
 
 
@@ -54,7 +53,7 @@ def copy_reference(t: CaptureTick) -> None:
     copy_into(given.q_ref, own.q_ref)
     copy_into(given.v_ref, own.v_ref)
     copy_into(given.angular_momentum, own.angular_momentum)
-    x, y = t.offsets[targets.LEAN_X], t.offsets[targets.LEAN_Y]
+    x, y = t.offsets.lean[0], t.offsets.lean[1]
     angle = np.sqrt(x * x + y * y)
     cos, sin = np.cos(angle), np.sin(angle)
     if angle > 0.0:
@@ -99,7 +98,7 @@ def guide_com(
         rest_y += sin * g.rest_ahead
     if t.recentring.stage == SHIFTING:
         rest_x, rest_y = t.recentring.capture_target[0], t.recentring.capture_target[1]
-    x, y = turned(cos, sin, offsets[targets.COM_X], offsets[targets.COM_Y])
+    x, y = turned(cos, sin, offsets.com[0], offsets.com[1])
     rest_x += x
     rest_y += y
     back = t.memory.return_fraction
@@ -115,20 +114,20 @@ def guide_com(
     find_nearest(region, desired, p)
     over_x, over_y = desired[0] - p[0], desired[1] - p[1]
     scale = min(1.0, overreach / max(np.sqrt(over_x * over_x + over_y * over_y), 1e-9))
-    p[0] += over_x * scale + cos * offsets[targets.COP_X] - sin * offsets[targets.COP_Y]
-    p[1] += over_y * scale + sin * offsets[targets.COP_X] + cos * offsets[targets.COP_Y]
+    p[0] += over_x * scale + cos * offsets.cop[0] - sin * offsets.cop[1]
+    p[1] += over_y * scale + sin * offsets.cop[0] + cos * offsets.cop[1]
     for a in range(2):
         own.com[a], own.com_vel[a], own.cop[a] = s.com[a], s.com_vel[a], p[a]
         own.com_acc[a] = s.omega[0] * s.omega[0] * (s.com[a] - p[a])
-    row = SWING if t.memory.swinging else STANCE
-    x, y = pivot_offset(t.search.feedback, s, row, cos, sin)
+    f = t.search.feedback
+    x, y = pivot_offset(f, s, f.swing if t.memory.swinging else f.stance, cos, sin)
     own.com_acc[0] += s.omega[0] * s.omega[0] * x
     own.com_acc[1] += s.omega[0] * s.omega[0] * y
     half = 0.25 * (stride_x * stride_x + stride_y * stride_y)
     leg_height = np.sqrt(max(g.leg_length * g.leg_length - half, 0.0))
-    own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets[targets.COM_Z]
+    own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets.height
     if t.memory.swinging:
-        own.com[2] += t.search.feedback.added[HEIGHT] - g.swing_com_drop
+        own.com[2] += t.search.feedback.added.height - g.swing_com_drop
     own.com_vel[2] = own.com_acc[2] = 0.0
     limit_posture(t)
 

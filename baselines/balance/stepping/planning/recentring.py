@@ -20,7 +20,6 @@ from .blocks import (
     Search,
 )
 from .config import RecentringConfig
-from .feedback import PHASE
 from .search import (
     distance_outside,
     end_capture_point,
@@ -184,7 +183,7 @@ def plan_recentring(q: Search, r: Recentring) -> None:
     """The step of the foot that goes back, into the best of the search."""
     schedule_feedback(q)
     foot = r.foot
-    q.feedback.signals[PHASE] = 0.0
+    q.feedback.signals.phase = 0.0
     set_foot(q, foot)
     set_start(q, q.state.sole_point[foot, 0], q.state.sole_point[foot, 1])
     _find_foothold(q, r, r.swing_time)
@@ -194,7 +193,7 @@ def plan_recentring(q: Search, r: Recentring) -> None:
 @compiled
 def replan_recentring(q: Search, r: Recentring, w: Swing) -> bool:
     """The same in its swing; False where ξ can no longer be caught near the nominal stance."""
-    q.feedback.signals[PHASE] = w.time / w.duration
+    q.feedback.signals.phase = w.time / w.duration
     set_foot(q, r.foot)
     set_start(q, w.reference[0, 0], w.reference[0, 1])
     _find_foothold(q, r, max(time_left(w), FROZEN))

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
-from poise.baselines.balance.references.targets import FOOTHOLD_X, FOOTHOLD_Y
-from poise.baselines.balance.references.targets import TIME as TIME_OFFSET
+from poise.baselines.balance.references.targets import Offsets
 from poise.envs.compiled.calls import NO_KERNEL, address_of, call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import drifted_point
@@ -19,11 +18,6 @@ from .blocks import Search
 from .config import FootholdChoice, StepLimits
 from .cop_region import CopRegion, distance_beyond, single_support_region
 from .feedback import (
-    AHEAD,
-    OUTWARD,
-    PHASE,
-    PLAN,
-    TIME,
     FeedbackArrays,
     evaluate_feedback,
     pivot_offset,
@@ -39,7 +33,7 @@ CHANGE_PRICE = 0.02  # [m/s] of another step time while the foot swings
 @compiled
 def set_capture_point(q: Search) -> None:
     """Set the capture point that steps and CoP follow: ξ + r, see `PivotConfig`."""
-    x, y = pivot_offset(q.feedback, q.state, PLAN, q.heading[0], q.heading[1])
+    x, y = pivot_offset(q.feedback, q.state, q.feedback.plan, q.heading[0], q.heading[1])
     q.capture_point[0] = q.state.capture_point[0] + x
     q.capture_point[1] = q.state.capture_point[1] + y
 
@@ -86,8 +80,8 @@ def to_heading(q: Search, x: float, y: float) -> tuple[float, float]:
 def with_offsets(q: Search, x: float, y: float) -> tuple[float, float]:
     """A foothold (x, y) in the frame of the step, moved by feedback and by a policy [m]."""
     added, side = q.feedback.added, q.foot_sign[q.foot]
-    x += added[AHEAD] + q.offsets[FOOTHOLD_X]
-    return x, y + side * added[OUTWARD] + q.offsets[FOOTHOLD_Y]
+    x += added.ahead + q.offsets.foothold[0]
+    return x, y + side * added.outward + q.offsets.foothold[1]
 
 
 @compiled
@@ -161,7 +155,7 @@ def _weigh(q: Search, time: float, extra: float) -> None:
 def _offset_time(q: Search) -> None:
     """Let the best step land earlier or later, as feedback and a policy want."""
     q.best_offset = 0.0
-    offset = q.feedback.added[TIME] + q.offsets[TIME_OFFSET]
+    offset = q.feedback.added.time + q.offsets.time
     if offset == 0.0:
         return
     q.time = max(q.best_time + offset, FROZEN)
@@ -183,7 +177,7 @@ def plan_step(q: Search) -> None:
     """The cheapest step of either foot from where they stand: the best of the search."""
     schedule_feedback(q)
     q.best_foot = -1
-    q.feedback.signals[PHASE] = 0.0
+    q.feedback.signals.phase = 0.0
     for foot in range(2):
         set_foot(q, foot)
         set_start(q, q.state.sole_point[foot, 0], q.state.sole_point[foot, 1])
@@ -203,7 +197,7 @@ def replan_step(q: Search, foot: int, w: Swing) -> None:
     planned = max(time_left(w) - w.time_offset, FROZEN)
     coasting = 0.5 * min(planned, 0.1)  # [s] in which its speed carries the foot anyway
     q.best_foot = -1
-    q.feedback.signals[PHASE] = w.time / w.duration
+    q.feedback.signals.phase = w.time / w.duration
     set_foot(q, foot)
     set_start(
         q,
@@ -224,13 +218,13 @@ def make_search(
     limits: StepLimits,
     choice: FootholdChoice,
     feedback: FeedbackArrays,
-    offsets: np.ndarray,
+    offsets: Offsets,
     rule: Callable[[Search], None] = capture_foothold,
     arc: float = 0.0,
 ) -> Search:
     """The search for steps of a robot from a state; `rule` finds the foothold of a foot and time.
 
-    `offsets` (13,) are the `values` of `StepOffsets`, `arc` is that of `IPMStepConfig`.
+    `arc` is that of `IPMStepConfig`.
     """
     search = Search.allocate(
         {"k": region.alone.shape[1]}, state=state, region=region, offsets=offsets,

@@ -7,18 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.balance.references.targets import (
-    COM_X,
-    COM_Y,
-    COM_Z,
-    COP_X,
-    COP_Y,
-    LEAN_X,
-    LEAN_Y,
-)
+from poise.baselines.balance.references.targets import Offsets, no_offsets
 from poise.baselines.balance.stepping.capture_step import CaptureStep
 from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
-from poise.baselines.balance.stepping.planning.feedback import PHASE
 from poise.baselines.balance.stepping.planning.recentring import SHIFTING
 from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.baselines.controller import WrappedController
@@ -212,7 +203,7 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             region, overreach = planned.alone(regions, stance, feet[stance], yaw), 0.0
             ground, stride = feet[stance, 2], c.swing.foothold - feet[stance, :2]
             if left[0] > readable.FROZEN:  # the last ticks keep what was fed back
-                planner.phase = c.feedback.signals[PHASE]
+                planner.phase = c.feedback.signals.phase
                 raised[0] = planner.added(state, c.foot, yaw)[3]
             left[0] = time_left(c.swing)
         else:
@@ -231,10 +222,11 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             )
 
     offsets = controller.offsets
-    added = np.zeros(len(offsets.values))
-    added[[COM_X, COM_Y, COP_X, COP_Y, COM_Z]] = 0.02, -0.01, 0.01, 0.005, -0.01
-    added[[LEAN_X, LEAN_Y]] = 0.05, 0.08
-    monkeypatch.setattr(offsets, "clear", lambda: np.copyto(offsets.values, added))  # by the reset
+    moved = no_offsets()
+    moved.com[:], moved.cop[:], moved.height = (0.02, -0.01), (0.01, 0.005), -0.01
+    moved.lean[:] = 0.05, 0.08
+    added = moved.values
+    monkeypatch.setattr(Offsets, "clear", lambda own: np.copyto(own.values, added))  # by the reset
     watched(controller, 22.0, direction, look, duration=2.5)
     assert set(stages) == (set(range(4)) if name == "feedback-step" else {0})
     assert kinds == {True, False} and np.array_equal(offsets.values, added)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import (
     BOUNCE_TIME,
     INACTIVE,
@@ -112,7 +111,7 @@ def test_foothold_home(shift):
     )
     q = planner.search(state)
     q.heading[:] = 1.0, 0.0
-    recentring.foot, q.feedback.signals[LATER_STEP] = 1, 1.0
+    recentring.foot, q.feedback.signals.later_step = 1, 1.0
     plan_recentring(q, recentring)
     stance, foot = state.sole_points[:, :2]
     readers = readable.ReadablePlanner(planner)
