@@ -31,7 +31,7 @@ from .config import EstimatorConfig
 from .drawn import DrawnRobot, Plant
 from .external_force import ExternalForce, bear_load, begin_force, keep_load, observe_force
 from .friction import SlidingFriction, allocate_friction, begin_friction, learn_friction
-from .inekf import Invariant, begin_invariant, follow_invariant
+from .inekf import Invariant, allocate_invariant, begin_invariant, follow_invariant
 from .measurement import RING, Rings, Sensors, arrived, begin_sensors, measure
 from .motors import MotorHistory, Motors, begin_motors, drive_motors
 from .odometry import Odometry, begin_odometry, copy_axes, follow_measurements
@@ -151,8 +151,9 @@ def _stand_on_ground(b: Estimation):
             feet += 1
     if feet > 0:
         b.odometry.position[2] -= SINK * total / feet
-        for i in range(1, b.invariant.place.shape[0]):  # the position there, and the soles
-            b.invariant.place[i, 2] -= SINK * total / feet
+        b.invariant.position[2] -= SINK * total / feet
+        for i in range(b.invariant.soles.shape[0]):
+            b.invariant.soles[i, 2] -= SINK * total / feet
 
 
 class EstimatedState(StateSource, Copyable):
@@ -185,8 +186,7 @@ class EstimatedState(StateSource, Copyable):
         self.promise = promises.last
         own = {"robot": self.arrays, "state": self.state_arrays, "rings": rings}
         self.odometry = Odometry.allocate(sizes, **own, promises=promises)
-        errors = {"n": 15 + 3 * sizes["nc"], **sizes}
-        self.invariant = Invariant.allocate(errors, odometry=self.odometry)
+        self.invariant = allocate_invariant(self.odometry, sizes)
         self.estimation = Estimation.allocate(
             sizes,
             **own,

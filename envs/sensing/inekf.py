@@ -18,6 +18,7 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mutable import Mutable
 
 from .config import EstimatorConfig
@@ -25,15 +26,16 @@ from .measurement import DRIFT_TIME
 from .odometry import START_SPEED, Odometry, copy_axes, keep_joints, place_pressure
 from .promises import turn_axes
 
-V, P_, D = 0, 1, 2  # rows of `Invariant.place`; D is the first sole's
-
 
 @dataclass(eq=False)
 class Invariant(Block):
     """The filter of a robot with nc soles; n = 15 + 3 nc errors."""
 
     odometry: Odometry  # whose joints, axes, position and velocity are filled
-    place: Annotated[np.ndarray, "nc+2", 3]  # v [m/s], p, d₁ … [m]
+    place: np.ndarray  # (nc + 2, 3) v, p, d₁ …, of which those that follow are parts
+    velocity: np.ndarray  # (3,) v of the root [m/s]
+    position: np.ndarray  # (3,) p of the root [m]
+    soles: np.ndarray  # (nc, 3) d₁ … [m]
     gyro_bias: Annotated[np.ndarray, 3]  # root axes [rad/s]
     force_bias: Annotated[np.ndarray, 3]  # root axes [m/s²]
     P: Annotated[np.ndarray, "n", "n"]
@@ -58,6 +60,15 @@ class Invariant(Block):
     lift: Mutable[float]  # of an unloaded one [m/s]
 
 
+def allocate_invariant(odometry: Odometry, sizes: dict[str, int]) -> Invariant:
+    """The filter of a robot, whose state is all zeros."""
+    place = guarded_zeros((sizes["nc"] + 2, 3))
+    return Invariant.allocate(
+        {"n": 15 + 3 * sizes["nc"]}, odometry=odometry, place=place, velocity=place[0],
+        position=place[1], soles=place[2:],
+    )  # fmt: skip
+
+
 def begin_invariant(f: Invariant, noises: dict[str, float], c: EstimatorConfig) -> None:
     """Start at the odometry's state, with what the sensors' noises are thought to be."""
     own, drift = c.invariant, noises["tilt_drift"]
@@ -76,14 +87,14 @@ def begin_state(f: Invariant, attitude: float, speed: float, gyro: float, force:
     """Start where the odometry's state is, with these deviations of R, v and the biases."""
     o, P = f.odometry, f.P
     n, nc = P.shape[0], f.place.shape[0] - 2
-    copy_into(o.v[:3], f.place[V])
-    copy_into(o.position, f.place[P_])
+    copy_into(o.v[:3], f.velocity)
+    copy_into(o.position, f.position)
     for i in range(nc):
         find_sole(f, i, o.q)
         for a in range(3):
-            f.place[D + i, a] = f.place[P_, a]
+            f.soles[i, a] = f.position[a]
             for b in range(3):
-                f.place[D + i, a] += o.axes[a, b] * f.seen[b]
+                f.soles[i, a] += o.axes[a, b] * f.seen[b]
     for r in range(n):
         for c in range(n):
             P[r, c] = 0.0
@@ -111,8 +122,8 @@ def follow_invariant(f: Invariant, last: int, earlier: int):
     o.seen = max(last, o.seen)
     quaternion_of(o.axes, f.quaternion)
     axes_of(f.quaternion, o.axes)
-    copy_into(f.place[V], o.v[:3])
-    copy_into(f.place[P_], o.position)
+    copy_into(f.velocity, o.v[:3])
+    copy_into(f.position, o.position)
 
 
 @compiled
@@ -133,16 +144,16 @@ def lead_on(f: Invariant, gyro: np.ndarray, force: np.ndarray):
     for a in range(3):
         for b in range(3):
             f.before[a, b] = 0.5 * (f.before[a, b] + R[a, b])
-    f.place[V, 2] -= dt * o.robot.gravity  # v + g dt, which both the state and its error go by
+    f.velocity[2] -= dt * o.robot.gravity  # v + g dt, which both the state and its error go by
     _lead_errors(f)
     _transpose(f.P)
     _lead_errors(f)
     _add_noise_of_imu(f)
     for a in range(3):
         for b in range(3):
-            f.place[V, a] += dt * R[a, b] * (force[b] - f.force_bias[b])
+            f.velocity[a] += dt * R[a, b] * (force[b] - f.force_bias[b])
     for a in range(3):
-        f.place[P_, a] += dt * f.place[V, a]
+        f.position[a] += dt * f.velocity[a]
 
 
 @compiled
@@ -235,9 +246,9 @@ def wander(f: Invariant, row: int, i: int):
     if o.rings.found[row, i] > 0.0 and load > 0.0:
         roll = f.slide**2 + f.roll**2 * turning
         doubt = min(doubt, roll / (load * load))
-        f.place[D + i, 0] -= dt * (f.z[1] * rz - f.z[2] * ry)
-        f.place[D + i, 1] -= dt * (f.z[2] * rx - f.z[0] * rz)
-        f.place[D + i, 2] -= dt * (f.z[0] * ry - f.z[1] * rx)
+        f.soles[i, 0] -= dt * (f.z[1] * rz - f.z[2] * ry)
+        f.soles[i, 1] -= dt * (f.z[2] * rx - f.z[0] * rz)
+        f.soles[i, 2] -= dt * (f.z[0] * ry - f.z[1] * rx)
     for a in range(9 + 3 * i, 12 + 3 * i):
         f.P[a, a] += dt * doubt
 
@@ -294,7 +305,7 @@ def see_sole(f: Invariant, row: int, i: int):
     o, s = f.odometry, f.odometry.state
     find_sole(f, i, o.rings.q[row])
     for a in range(3):
-        f.z[a] = f.place[P_, a] - f.place[D + i, a]
+        f.z[a] = f.position[a] - f.soles[i, a]
         for b in range(3):
             f.z[a] += o.axes[a, b] * f.seen[b]
             total = 0.0

@@ -23,9 +23,12 @@ class Treads(Block):
     approach: float  # [m]
     highest: float  # [m]
     clearance: float  # [m]
-    hold: np.ndarray  # (2,) up, down [of the swing]
-    rise: np.ndarray  # (2,)
-    lower: np.ndarray  # (2,)
+    hold_up: float  # of a swing that goes up [of the swing]
+    hold_down: float
+    rise: float
+    rise_down: float
+    lower: float
+    lower_down: float
     arrive: float
     lean: float  # [rad/m]
     lean_from: float  # [m]

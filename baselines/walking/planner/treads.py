@@ -22,7 +22,6 @@ MOST_STEPS = 4  # before the first tread, in which the steps become as long as m
 NOT_HELD = 1.0  # [m] cost of a foothold where no surface holds the sole
 OTHER = 0.12  # [m] cost of another surface than the one that a step aims at
 SLOW = 0.02  # [m/s]
-UP, DOWN = 0, 1
 
 
 @compiled
@@ -208,9 +207,10 @@ def advance_over_edges(t: WalkTick) -> None:
     between = t.walk.state.sole_point[1 - t.walk.memory.foot, 2]
     own = surface_below(r.surfaces, r.left[0], r.left[1])
     plain = own == surface_below(r.surfaces, w.foothold[0], w.foothold[1])
-    way = DOWN if end < start - LEVEL else UP
-    hold, arrive, rise = r.hold[way] * whole, r.arrive * whole, r.rise[way] * whole
-    lower, apex = r.lower[way] * whole, max(start, end, between)
+    down, arrive, apex = end < start - LEVEL, r.arrive * whole, max(start, end, between)
+    hold = (r.hold_down if down else r.hold_up) * whole
+    rise = (r.rise_down if down else r.rise) * whole
+    lower = (r.lower_down if down else r.lower) * whole
     apex += max(r.clearance, t.gait.commanded_clearance)
     if plain:
         hold, arrive, rise, lower = 0.0, whole, w.lift * whole, w.lift * whole

@@ -189,7 +189,7 @@ def test_a_sole_is_of_the_difference_of_positions(filter_, i):
     f = filter_
     f.odometry.rings.q[0] = f.odometry.state.qpos[7:] + 0.1
     find_sole(f, i, f.odometry.rings.q[0])
-    f.place[2 + i] = f.place[1] + f.odometry.axes @ f.seen
+    f.soles[i] = f.position + f.odometry.axes @ f.seen
     f.encoder, f.kinematics = 0.001, 0.0005
     P = f.P.copy()
 
