@@ -14,7 +14,7 @@ from poise.envs.viewing.camera import Camera, beside
 from poise.envs.viewing.renderer import SceneRenderer
 from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.results.replay import replay
-from poise.training.benchmarking.trials.signals import Signals
+from poise.training.benchmarking.trials.signals import TrialSignals
 
 from .cells import Download, cells_csv, download
 
@@ -57,7 +57,7 @@ class Film:
     """
 
     record: Record
-    signals: Signals
+    signals: TrialSignals
     frames: Sequence[tuple[float, bytes]]
     same: bool
 
@@ -105,7 +105,7 @@ def film_again(results: Results, record: Record, times: Sequence[float], draw: b
         ConfigError: the controller or the robot is no longer what was evaluated.
         PoiseError: nothing can be drawn here.
     """
-    signals, camera = Signals(), _FrameTaker(times if draw else (), record.direction)
+    signals, camera = TrialSignals(), _FrameTaker(times if draw else (), record.direction)
 
     def watch(env: BalanceEnv) -> None:
         signals(env)
