@@ -182,8 +182,12 @@ class MomentumQP(BoundQP, CompiledController):
     @property
     def compiled(self) -> bool:
         """True with the compiled solver, and kernels for all tasks; see `CompiledController`."""
-        kernels = all(task.kernel is not None for task, _ in self.tasks.values())
-        return super().compiled and self.solver is None and kernels
+        return super().compiled and self.solver is None and self._kernels
+
+    @property
+    def _kernels(self) -> bool:
+        """True with kernels for all tasks."""
+        return all(task.kernel is not None for task, _ in self.tasks.values())
 
     def gains(self) -> QPParameters:
         """The parameters in SI units; see `CompiledController`."""
@@ -226,7 +230,7 @@ class MomentumQP(BoundQP, CompiledController):
     def _filled(self, state: RobotState, targets: Targets) -> Assembly:
         """`assembly`, with the rows of tasks that Python fills."""
         problem = self.assembly(state, targets)
-        if not self.compiled:
+        if not self._kernels:
             vel = np.nan_to_num((state.cop - self.workspace.cop_prev) / self.period)
             given = task_input(state, problem.targets, cop_vel=vel)
             fill_from_python(problem.tasks, list(self.tasks.values()), given)

@@ -43,7 +43,7 @@ def arm_scales(robot: Robot) -> np.ndarray:
     return scales
 
 
-def allocate_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Arms:
+def swinging_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Arms:
     """The arms of a robot; `posture_weight` (nv,) is that of the QP, which `swing_arms` changes,
     and `weight` the one of joints that swing, in 1/ω⁴."""
     scales, swung = arm_scales(robot), posture_weight.copy()

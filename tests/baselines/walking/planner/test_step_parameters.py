@@ -11,7 +11,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.arms import arm_scales, largest_swing
 from poise.baselines.walking.planner.command import GaitCommand, command_of
-from poise.baselines.walking.planner.reach import COMMANDED, least_width, shared_reach
+from poise.baselines.walking.planner.reach import COMMANDED, shared_reach, touching_width
 from poise.configs.errors import ConfigError
 from tests.support.shared import robot
 
@@ -212,7 +212,7 @@ def test_every_packaged_robot_says_what_swings_its_arms(name):
     found = Played((0.04, GaitCommand()), name=name)
     for foot, sign in enumerate((1.0, -1.0)):
         assert _hand_ahead(found.env, scales[foot]) < -0.02, (name, foot, sign)
-    assert 0.0 < least_width(body) < 0.3 * body.height_com
+    assert 0.0 < touching_width(body) < 0.3 * body.height_com
 
 
 def _hand_ahead(env, scales):
