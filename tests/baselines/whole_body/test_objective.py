@@ -1,6 +1,6 @@
 """The objective is the sum of its tasks: each can be read, replaced, dropped and added to."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar
 
 import numpy as np
@@ -201,7 +201,7 @@ class SimpleWorkspace:
 
 
 @dataclass(frozen=True)
-class AnkleTorques(Task[TorquesBlock]):
+class JointTorques(Task[TorquesBlock]):
     """½ w Σ (τ − 3 N·m)² of all joints: a user's cost on torques, without kernel."""
 
     space: ClassVar[TaskSpace] = TaskSpace.TORQUES
@@ -218,14 +218,14 @@ def test_a_users_cost_changes_the_qp_as_its_equation_says():
     """½xᵀHx + gᵀx grows from x to y by ½ w Σ (τ − 3)² of y less that of x; and it is followed."""
     tick, robot = recovery()[40], robot_named("humanoid")
     plain = MomentumQP(robot, controller_config("momentum-qp"))
-    mine = MomentumQP(robot, replace(plain.config, tasks={"mine": AnkleTorques(1e-3)}))
+    mine = MomentumQP(robot, replace(plain.config, tasks={"mine": JointTorques(0.1)}))
     assert plain.compiled and not mine.compiled
     before, after = (qp.problem(tick.state, tick.targets) for qp in (plain, mine))
     ws, rng = mine.workspace, np.random.default_rng(0)
     x, y = rng.normal(size=(2, len(before.g)))
 
     def cost(x):
-        return 0.5e-3 * np.sum((ws.T @ x + ws.tau0 - 3.0) ** 2)
+        return 0.05 * np.sum((ws.T @ x + ws.tau0 - 3.0) ** 2)
 
     def value(qp, x):
         return 0.5 * x @ qp.H @ x + qp.g @ x
@@ -244,7 +244,7 @@ def test_a_users_cost_changes_the_qp_as_its_equation_says():
 def from_python(task):
     """The same task without kernel."""
     kind = type(f"Python{type(task).__name__}", (type(task),), {"kernel": None})
-    return kind(**{name: getattr(task, name) for name in task.__dataclass_fields__})
+    return kind(**{field.name: getattr(task, field.name) for field in fields(task)})
 
 
 @pytest.mark.parametrize("name", [*STANDARD, "root"])
