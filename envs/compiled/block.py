@@ -133,7 +133,7 @@ class Block:
         """The values of `named`, in order."""
         return tuple(self.named().values())
 
-    def numbers(self) -> dict[str, float]:
+    def mutable_values(self) -> dict[str, float]:
         """The values of all mutable numbers by name."""
         return {name: getattr(self, name) for name in self.mutable}
 

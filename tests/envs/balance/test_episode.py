@@ -352,5 +352,5 @@ def test_a_new_episode_forgets_the_last():
     begin_episode(simulation.state_arrays, e)
     assert not e.action.any() and not e.last_action.any() and not e.reward_terms.any()
     assert e.metrics.min_cop_margin == np.inf
-    assert np.count_nonzero(list(e.metrics.numbers().values())) == 1
+    assert np.count_nonzero(list(e.metrics.mutable_values().values())) == 1
     np.testing.assert_array_equal(e.sole_start, simulation.state.sole_points[:, :2])
