@@ -179,14 +179,13 @@ class Walk(Commanded, CaptureStep):
             self.gait_sets, capture.state, capture.reference_out, gait.swing,
             self._swing.reference, self.memory.level_frame, legs,
         )  # fmt: skip
-        swing = replace(
-            capture.swing,
+        swing = capture.swing.replace(
             **in_si(gait.swing, units, "lift", "landing_speed"),
             apex=gait.swing.clearance * units.height,
         )
-        return replace(
-            capture, swing=swing,
-            gains=replace(capture.gains, **in_si(gait, units, *LEG_NUMBERS)),
-            search=replace(capture.search, **in_si(self.gait_limits, units, *SEARCHED)),
+        return capture.replace(
+            swing=swing,
+            gains=capture.gains.replace(**in_si(gait, units, *LEG_NUMBERS)),
+            search=capture.search.replace(**in_si(self.gait_limits, units, *SEARCHED)),
             **ticks,
         )  # fmt: skip
