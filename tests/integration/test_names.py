@@ -23,8 +23,6 @@ KEPT = {
     "view": COMMAND,
     "check": "`poise motion check` and `poise policies check`",
     "play": "`poise motion play`, and the part of a thread of `StepSchedule`",
-    "command_turn": "terms of one name in two environments",
-    "command_velocity": "terms of one name in two environments",
     "contacts": "a term, and a part of what `prepare` compiles",
     "steps": "a term, and a part of what `prepare` compiles",
     "push_force": TERM,

@@ -28,7 +28,7 @@ class Guided(AroundQP, ABC):
             raise ConfigError(
                 "must be a task of kind 'com', whose gains are taken out", field="qp.com"
             )
-        self.gains: CoMBlock = task.block
+        self._com: CoMBlock = task.block
         self._guided: Targets | None = None
 
     @abstractmethod
@@ -41,7 +41,7 @@ class Guided(AroundQP, ABC):
         guided = self._guided
         guided.take(targets)
         p = self.cop(state, targets)
-        gains = self.gains
+        gains = self._com
         guided.com_acc[:2] += (
             state.omega**2 * (state.com[:2] - p)
             - gains.stiffness[:2] * (targets.com[:2] - state.com[:2])

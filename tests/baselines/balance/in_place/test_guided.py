@@ -10,8 +10,10 @@ from poise.baselines.balance.in_place.capture_point import CapturePoint, Capture
 from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.balance.in_place.lqr_lip import LQRLIP, lqr_gain
 from poise.baselines.controller import Targets
+from poise.baselines.registry import load_controller
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.tasks.task import TaskSpace
+from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.pendulum import lip_step
 from poise.envs.compiled.maths.polygons import half_planes
 from poise.envs.physics.simulation import Simulation
@@ -164,3 +166,8 @@ def test_a_reset_forgets():
             plans.append(controller.plan(state, targets))
     np.testing.assert_array_equal(plans[0], plans[2])
     np.testing.assert_array_equal(plans[1], plans[3])
+
+
+def test_a_pendulum_needs_the_com_task_whose_gains_it_takes_out():
+    with pytest.raises(ConfigError, match=r"qp.com: must be a task of kind 'com'"):
+        load_controller({"base": "lqr-lip", "qp": {"base": "momentum-qp", "com": None}}, robot())
