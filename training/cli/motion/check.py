@@ -138,7 +138,7 @@ def follow(
     from poise.training.motion.following.tracked import follow_clip, following, tracker_config
     from poise.training.pictures.figures.encoder import check_video
     from poise.training.pictures.figures.playback import check_size
-    from poise.training.pictures.motion_report.film import Film
+    from poise.training.pictures.motion_report.film import MotionFilm
     from poise.training.pictures.motion_report.page import check_page
     from poise.training.pictures.motion_report.performance import Watched, write_performance
 
@@ -191,7 +191,7 @@ def follow(
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return 0
         watched = Watched() if report is not None else None
-        film = None if video is None else stack.enter_context(Film(video, size, watched))
+        film = None if video is None else stack.enter_context(MotionFilm(video, size, watched))
         waits_so = Tempo(waits=True) if waits else None
         trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
                          impulse=push, share=share, directions=directions, seed=seed, speed=tempo,

@@ -104,7 +104,7 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        course = Course(reference.commands, None if watch is None else watch(trial))
+        course = FollowedWalk(reference.commands, None if watch is None else watch(trial))
         followed = _followed(run_trial(agent, trial, course), trial)
         walked, turned = course.shares()
         trials.append(replace(followed, walked=walked, turned=turned))
@@ -113,7 +113,7 @@ def follow(
     return trials
 
 
-class Course:
+class FollowedWalk:
     """Path of a robot while a walk is commanded: a `Watch` that also calls another."""
 
     def __init__(self, commands: np.ndarray | None, other: Watch | None = None):

@@ -110,7 +110,7 @@ def _followed(
     until = max(ends + AFTER, 0.0 if push is None else push.start + SETTLING)
     pushes = [] if push is None else [asdict(push)]
     env.reset(seed=seed, options={"push": pushes, "qpos": _start(env, track, seed)})
-    reference, rest = Reference(env.robot, track), np.zeros(len(env.action_names))
+    reference, rest = ClipReference(env.robot, track), np.zeros(len(env.action_names))
     while not fallen and env.simulation.time < until - 0.5 * period:
         env.step_without_info(rest)
         step = round(env.simulation.time / period)
@@ -141,7 +141,7 @@ def _start(env: ResidualBalanceEnv, track: MotionTrack, seed: int) -> np.ndarray
     return qpos
 
 
-class Reference:
+class ClipReference:
     """Joints, bodies and CoM of a clip where it has been laid."""
 
     def __init__(self, robot: Robot, track: MotionTrack):
