@@ -12,6 +12,7 @@ from typing import TextIO
 import tyro
 
 import poise
+from poise.baselines.extras import load_extra
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
 from poise.training.running.options.arguments import check_flags
 from poise.training.running.options.pages import print_commands
@@ -34,8 +35,8 @@ HELP = ("-h", "--help", "--help-all")
 ALONE = ("--help", "--version", "--print-completion")  # options without a command
 USAGE = """usage: poise COMMAND [OPTIONS]
 
-Keep a simulated humanoid on its feet while it is pushed. Start with: poise demo.
-poise COMMAND --help tells of a command, poise --version which version this is.
+Keep a simulated humanoid on its feet while it is pushed. To begin: poise demo.
+poise COMMAND --help lists the options of a command.
 """
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
@@ -133,9 +134,7 @@ def _run(args: list[str]) -> int:
         run(given)
         return 0
     if name == "motion":  # it has sub-commands
-        from .motion.commands import run as run_motion
-
-        return run_motion(given)
+        return int(load_extra("commands", name)(given))
     if name == "policies":  # it has one, too
         return run_policies(given)
     return answered(COMMANDS[name], given, f"poise {name}")

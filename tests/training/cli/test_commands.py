@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
@@ -289,7 +288,7 @@ def test_a_broken_pipe_of_another_kind_is_raised(
         (["benchmark", "momentum-pq", "--out", "out"], "'momentum-pq', did you mean momentum-qp?"),
         (["benchmark", "--out", "out", "--suite", "standart"], "'standart', did you mean standard"),
         (["compare", "run"], "compare: needs DIR_B"),
-        (["replay", "run"], "replay: needs --trial INT"),
+        (["replay", "run"], "replay: needs --trial N"),
         (["replay", "run", "--trial", "first"], "replay: --trial: must be a whole number, not 'fi"),
         (["view", "--tril", "3"], "view: --tril: no such option, did you mean --trial?"),
         (["view", "--robot", "t1"], "no such name: 't1', did you mean booster_t1?"),
@@ -440,18 +439,16 @@ def test_without_arguments_the_commands_are_listed(capsys: pytest.CaptureFixture
 def test_help_says_how_an_own_class_is_named(
     capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
-    with pytest.raises(SystemExit):
-        main([command, "--help"])
-    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert main([command, "--help"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
     assert "--allow my_file.py:Class" in shown and shown.count("my_file.py:Class") == 2
 
 
 @pytest.mark.parametrize("command", ["evaluate", "benchmark", "replay", "report", "tune", "train"])
 def test_help_says_what_may_be_allowed(capsys: pytest.CaptureFixture[str], command: str) -> None:
     """Whatever `poise.allowing` takes."""
-    with contextlib.suppress(SystemExit):
-        assert main([command, "--help"]) == 0
-    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert main([command, "--help"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
     assert "--allow NAME" in shown
     assert "module:Class or file.py:Class" in shown and all(end in shown for end in SCRIPTS)
 

@@ -20,13 +20,13 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, follows_no_motion, load_agent
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
 from poise.training.benchmarking.trials.play import Watch, run_trial
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.motion.tracking.record import ANYWHERE, TrackingFigures
+from poise.training.motion.tracking.record import TrackingFigures
 
 PUSH_TIME = 0.1  # [s]
-LONGEST = 600.0  # [s]
 LITTLE = 0.2  # [m, rad]
 LEAN = 30.0  # [deg] beyond the motion's own largest tilt
 FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion itself goes low

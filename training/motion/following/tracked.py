@@ -24,10 +24,11 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 from poise.envs.sensing.realism import load_realism
-from poise.training.motion.tracking.record import AFTER, ANYWHERE, COUNTED, LAST, SETTLING
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
+from poise.training.motion.tracking.record import AFTER, COUNTED, LAST, SETTLING
 from poise.training.motion.tracking.steps import NONE
 
-from .follow import LONGEST, PUSH_TIME, Followed
+from .follow import PUSH_TIME, Followed
 
 START_NOISE = 0.02  # [rad] of each joint of a start
 CLIPS = (".npz", ".csv")
