@@ -23,8 +23,11 @@ class MissingExtra(ConfigError):
     """
 
     def __init__(self, what: str, extra: str) -> None:
-        self.extra = extra
         super().__init__(f"needs poise[{extra}]: pip install 'poise[{extra}]'", source=what)
+        self.extra = extra
+
+    def __reduce__(self) -> tuple[type, tuple[str | None, str]]:
+        return type(self), (self.source, self.extra)  # a worker's error is its command's, too
 
 
 @cache

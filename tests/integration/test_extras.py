@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import pickle
 import subprocess
 import sys
 import tomllib
@@ -107,7 +108,10 @@ def test_names_that_moved_are_read_for_one_release(name: str) -> None:
 def test_what_no_package_registers_names_the_extra() -> None:
     with pytest.raises(MissingExtra) as caught:
         load_extra("controllers", "moon-walk")
-    assert caught.value.extra == "motion" and caught.value.source == "moon-walk"
+    error = caught.value
+    assert (error.extra, error.source) == ("motion", "moon-walk")
+    copy = pickle.loads(pickle.dumps(error))
+    assert (copy.extra, copy.source, str(copy)) == ("motion", "moon-walk", str(error))
     assert registered("nothing-of-the-kind") == {}
 
 

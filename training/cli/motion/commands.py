@@ -14,6 +14,7 @@ from poise.baselines.motion.clips.roles import ROLES
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
+from poise.configs.problems import out_of_range
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.options.arguments import OnRobot, Switch
 from poise.training.running.options.pages import print_commands
@@ -122,7 +123,7 @@ def convert(
     clip = clip.turned(turn * 3.141592653589793 / 180.0) if turn else clip
     if rate is not None:
         if not 1.0 <= rate <= 1000.0:
-            raise ConfigError(f"must be from 1 to 1000, not {rate:g}", field="rate")
+            raise out_of_range(rate, field="rate", least=1, most=1000, form="g")
         clip = clip.resampled(1.0 / rate)
     write_bvh(clip, out)
     print(out)

@@ -18,6 +18,7 @@ from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
@@ -96,7 +97,7 @@ def follow_clip(
         direction = 360.0 * k / directions % 360.0
         size = 0.0 if pushed is None else pushed(direction)
         if not 0.0 <= size < np.inf:
-            raise ConfigError(f"must be at least 0, not {size:g}", field="impulse")
+            raise out_of_range(size, field="impulse", least=0, form="g")
         push = Push(push_bodies(robot)[0], start, PUSH_TIME, size, direction) if size else None
         trials.append(_followed(env, track, seed + k, push))
     return trials
