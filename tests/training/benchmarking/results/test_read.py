@@ -163,7 +163,7 @@ def cells(**texts: str) -> Callable[[Path], None]:
         (edit("trials.csv", ",zero,", ",one,"), "'one' is not in summary.json"),
         (edit("summary.json", '"zero": {', '"other": {'), "ranking: must name all controllers"),
         (edit("settings.yaml", "zero: ", "one: "), "not those of settings.yaml"),
-        (summary(played=9), "has 8 trials"),
+        (summary(evaluated=9), "has 8 trials"),
         (summary(recovered=99), "recovered: must be a whole number"),
         (summary(recovered_rate="all"), "recovered_rate: must be a number, not 'all'"),
         (summary(trials=0), "trials: must be at least 1"),
