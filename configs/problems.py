@@ -18,6 +18,17 @@ TEXTS: Final[Mapping[str, str]] = MappingProxyType({
     "no file": "no such file: {value}{hint} give a path to a .yaml file or a packaged name",
     "type": "must be {expected}, not {value}",
     "range": "must be {limits}, not {value}",
+    "choice": "must be one of {valid}, not {value}",
+    "unknown command": "no such command: {value}{hint}",
+    "unknown option": "no such option{hint}",
+    "unknown argument": "takes no {value}: see {prog} --help",
+    "needs": "needs {what}",
+    "no value": "needs {count} behind it",
+    "unknown controller": "no such controller: {value}{hint} give a name, a .yaml file of a "
+    "controller, a folder written by poise train, an ONNX file or a folder with a deploy.yaml, or "
+    "module:Class",
+    "unknown policy": "no such policy: {value}{hint} give a packaged one or a folder written by "
+    "poise train",
 })  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from poise.baselines.motion.clips.roles import ROLES
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
-from poise.configs.problems import out_of_range
+from poise.configs.problems import Problem, out_of_range
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.options.arguments import OnRobot, Switch
 from poise.training.running.options.pages import print_commands
@@ -286,8 +286,8 @@ def run(args: Sequence[str]) -> int:
         return 0
     name = args[0]
     if name not in MOTION:
-        raise ConfigError(f"no such command: motion {shown(name)}{meant(name, MOTION)}",
-                          choices=MOTION)  # fmt: skip
+        hint, value = meant(name, MOTION), f"motion {shown(name)}"
+        raise Problem("unknown command", None, None, MOTION, value=value, hint=hint)
     return answered(MOTION[name], args[1:], f"poise motion {name}")
 
 

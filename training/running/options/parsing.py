@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import tyro
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.problems import Problem
 from poise.training.running.terminal import terminal
 
 from .described import Option, arguments_of
@@ -18,12 +19,10 @@ from .spelling import suggestion
 
 T = TypeVar("T")
 HELP = {"-h", "--help", "--help-all"}
-NUMBERS = {"invalid literal for int() with base 10: ": "must be a whole number, not ",
-           "could not convert string to float: ": "must be a number, not "}  # fmt: skip
-WRONG = {r"invalid choice ('.*') for argument '(.*)'. Expected one of \((.*?),?\)":
-         "{1}: must be one of {2}, not {0}",
-         r"Missing value for argument '(.*)'. Expected (\d+) value": "{0}: needs {1} behind it",
-         }  # fmt: skip
+NUMBERS = {r"invalid literal for int\(\) with base 10: (.*)": "a whole number",
+           r"could not convert string to float: (.*)": "a number"}  # fmt: skip
+CHOICE = re.compile(r"invalid choice ('.*') for argument '(.*)'. Expected one of \((.*?),?\)")
+NO_VALUE = re.compile(r"Missing value for argument '(.*)'. Expected (\d+) value")
 
 
 def parsed(function: Callable[..., T], args: Sequence[str], prog: str) -> Callable[[], T]:
@@ -79,15 +78,16 @@ def _error(said: str, prog: str, options: list[Option], args: Sequence[str]) -> 
         headings = {option.name: option.heading for option in options}
         found = [line.strip() for line in lines if re.match(r" {4}\S", line)]
         needed = [headings.get(line.split()[0], line) for line in found]
-        return ConfigError(f"needs {', '.join(needed)}", source=_command(prog))
+        return Problem("needs", _command(prog), what=", ".join(needed))
     if wrong := re.match(r"Error parsing ([^:]+): (.*)", text):
-        message = wrong[2]
-        for before, after in NUMBERS.items():
-            message = message.replace(before, after)
-        return ConfigError(message, source=_command(prog), field=wrong[1])
-    for pattern, message in WRONG.items():
-        if found := re.match(pattern, text):
-            return ConfigError(message.format(*found.groups()), source=_command(prog))
+        for pattern, expected in NUMBERS.items():
+            if no := re.search(pattern, wrong[2]):
+                return Problem("type", _command(prog), wrong[1], expected=expected, value=no[1])
+        return ConfigError(wrong[2], source=_command(prog), field=wrong[1])
+    if choice := CHOICE.match(text):
+        return Problem("choice", _command(prog), choice[2], valid=choice[3], value=choice[1])
+    if lacking := NO_VALUE.match(text):
+        return Problem("no value", _command(prog), lacking[1], count=lacking[2])
     return ConfigError(text or "cannot be read", source=_command(prog))
 
 
@@ -122,8 +122,6 @@ def _unknown(text: str, prog: str, options: list[str], args: Sequence[str]) -> C
     wrong = next((arg for arg in args if arg.partition("=")[0] == named), named)
     flag = wrong.partition("=")[0]
     if not flag.startswith("-"):
-        return ConfigError(f"takes no {shown(flag)}: see {prog} --help", source=_command(prog))
-    hint = suggestion(flag, options) or ";"
-    return ConfigError(
-        f"no such option{hint} {prog} --help lists them", source=_command(prog), field=flag
-    )
+        return Problem("unknown argument", _command(prog), value=shown(flag), prog=prog)
+    hint = f"{suggestion(flag, options) or ';'} {prog} --help lists them"
+    return Problem("unknown option", _command(prog), flag, hint=hint)
