@@ -81,7 +81,7 @@ class Synthesis:
             "duration": clip.duration,
             "cost": plan.paths[0].cost,
             "made": sorted(self.stage.derived),
-            "played": [asdict(part) for part in parts],
+            "parts": [asdict(part) for part in parts],
             "others": [{"cost": path.cost, "clips": [step.clip for step in path.steps]}
                        for path in plan.paths[1:]],
         }  # fmt: skip

@@ -34,7 +34,7 @@ def check(
     Args:
         motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
         qp: also solve the momentum QP at every sample of the motion.
-        controller: a momentum QP whose gains are used.
+        controller: momentum QP that supplies the gains.
         fit: change a .npz until the robot can perform it: slower, or with its centre of mass moved.
         out: the .npz file for the fitted motion.
 
@@ -104,22 +104,23 @@ def follow(
             motion is made first: a .motion or .csv file, the name of a packaged one, or its text.
             For a tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1, or
             "network" for the one within its network.
-        controller: as in poise evaluate; a policy from outside that tracks motions follows clips.
-        starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
-            at each tempo of --fastest.
+        controller: a controller as poise evaluate takes it; a policy from outside that tracks
+            motions follows clips.
+        starts: number of trials, each from a differently disturbed start; by default 20, or 5 at
+            each tempo of --fastest.
         push: impulse of a push at a random time of the motion [N s]; 0 for none.
         share: the same as a share of the J50 of the push's direction, standing (configs/limits).
-        directions: of the pushes, spread evenly, one after the other.
+        directions: number of directions of the pushes, spread evenly.
         tempo: speed factor of the motion.
         realism: realism level: ideal, lab, field, or a .yaml file.
         waits: let the motion wait while the robot recovers.
         fastest: find the largest tempo at which none of the trials falls.
-        seed: of starts and pushes.
+        seed: seed of starts and pushes.
         out: a JSON file to write the trials to.
         report: a .html file for pictures of the trial with the largest error: ZMP and centre of
             pressure, errors, tempo, and the timeline of a script's motion.
         video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost.
-        size: of the video, width and height [pixels], even.
+        size: width and height of the video [pixels], even.
 
     Returns:
         0 if no trial fell, 1 if one did.

@@ -13,6 +13,7 @@ from poise.baselines.balance.references.reference_motion import ReferenceMotion,
 from poise.baselines.balance.references.tempo import Tempo
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.pushes.push import Push
@@ -20,13 +21,13 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, follows_no_motion, load_agent
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
 from poise.training.benchmarking.trials.play import Watch, run_trial
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.motion.tracking.record import ANYWHERE, TrackingFigures
+from poise.training.motion.tracking.record import TrackingFigures
 
 PUSH_TIME = 0.1  # [s]
-LONGEST = 600.0  # [s]
 LITTLE = 0.2  # [m, rad]
 LEAN = 30.0  # [deg] beyond the motion's own largest tilt
 FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion itself goes low
@@ -81,13 +82,13 @@ def follow(
             measured limits, a speed that is not from 0.1 to 10.
     """
     if not 0.1 <= speed <= 10.0:
-        raise ConfigError(f"must be from 0.1 to 10, not {speed:g}", field="tempo")
+        raise out_of_range(speed, field="tempo", least=0.1, most=10, form="g")
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
     whole_number(seed, 0, "seed")
     for name, size in (("impulse", impulse), ("share", share)):
         if not 0.0 <= size < np.inf:
-            raise ConfigError(f"must be at least 0, not {size:g}", field=name)
+            raise out_of_range(size, field=name, least=0, form="g")
     if impulse and share:
         raise ConfigError("give either an impulse or a share of J50", field="share")
     body = robot if isinstance(robot, Robot) else load_robot(robot)

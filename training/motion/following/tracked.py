@@ -18,16 +18,18 @@ from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 from poise.envs.sensing.realism import load_realism
-from poise.training.motion.tracking.record import AFTER, ANYWHERE, COUNTED, LAST, SETTLING
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
+from poise.training.motion.tracking.record import AFTER, COUNTED, LAST, SETTLING
 from poise.training.motion.tracking.steps import NONE
 
-from .follow import LONGEST, PUSH_TIME, Followed
+from .follow import PUSH_TIME, Followed
 
 START_NOISE = 0.02  # [rad] of each joint of a start
 CLIPS = (".npz", ".csv")
@@ -95,7 +97,7 @@ def follow_clip(
         direction = 360.0 * k / directions % 360.0
         size = 0.0 if pushed is None else pushed(direction)
         if not 0.0 <= size < np.inf:
-            raise ConfigError(f"must be at least 0, not {size:g}", field="impulse")
+            raise out_of_range(size, field="impulse", least=0, form="g")
         push = Push(push_bodies(robot)[0], start, PUSH_TIME, size, direction) if size else None
         trials.append(_followed(env, track, seed + k, push))
     return trials
