@@ -58,8 +58,8 @@ class Residual(Block):
 def capture_error(s: StateArrays, motion: Motion, com_offset: float) -> float:
     """d², d the capture point's distance from that of the reference [m]."""
     nj = motion.samples.shape[1] - 6
-    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega[0]
-    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega[0]
+    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega
+    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega
     cos, sin = s.heading[0], s.heading[1]
     dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
     dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)

@@ -92,7 +92,7 @@ def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
     put_middle(t, new, t.stance)
     level = c.memory.level_frame
     outward = t.walk.search.foot_sign[1 - new] * step_width(t)
-    x, y = gait_offset(c.state.omega[0], step_time(g), g.transfer_time, 0.0, 0.0, outward)
+    x, y = gait_offset(c.state.omega, step_time(g), g.transfer_time, 0.0, 0.0, outward)
     x, y = turned(level[0, 0], level[1, 0], x, y)
     x, y = xi[0] - t.stance[0] - x, xi[1] - t.stance[1] - y
     p[0], p[1] = xi[0] + c.gains.gain * x, xi[1] + c.gains.gain * y
@@ -102,7 +102,7 @@ def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
 @compiled
 def transfer_cop(t: WalkTick, p: np.ndarray) -> bool:
     """The CoP on its way to the sole that has landed, into `p`; whether it has arrived."""
-    c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
+    c, g, omega = t.walk, t.gait, t.walk.state.omega
     new, xi = c.memory.foot, c.state.capture_point
     put_middle(t, new, t.stance)
     offset = offset_from(t, 1 - new)

@@ -176,14 +176,13 @@ class Walk(Commanded, CaptureStep):
             self.gait_sets, capture.state, capture.reference_out, gait.swing,
             self._swing.reference, self.memory.level_frame, legs,
         )  # fmt: skip
-        swing = replace(
-            capture.swing,
+        swing = capture.swing.replace(
             **in_si(Swing, gait.swing, units),
             apex=gait.swing.clearance * units.height,
         )
-        return replace(
-            capture, swing=swing,
-            gains=replace(capture.gains, **in_si(StepGains, gait, units)),
-            search=replace(capture.search, **in_si(Search, self.gait_limits, units)),
+        return capture.replace(
+            swing=swing,
+            gains=capture.gains.replace(**in_si(StepGains, gait, units)),
+            search=capture.search.replace(**in_si(Search, self.gait_limits, units)),
             **ticks,
         )  # fmt: skip

@@ -85,8 +85,8 @@ class ContactSets(BoundQP):
         configuration, then `tasks`."""
         chosen = self.sets[soles]
         feet, rows = slice(soles[0], soles[-1] + 1), slice(6 * soles[0], 6 * soles[-1] + 6)
-        own = replace(
-            s, J=s.J[rows], J_v=s.J_v[rows], Jdot_v=s.Jdot_v[rows], sole_point=s.sole_point[feet],
+        own = s.replace(
+            J=s.J[rows], J_v=s.J_v[rows], Jdot_v=s.Jdot_v[rows], sole_point=s.sole_point[feet],
             sole_axes=s.sole_axes[feet], contacts=s.contacts[feet], origin=guarded_zeros(3),
         )  # fmt: skip
         ws = chosen.workspace

@@ -6,6 +6,7 @@ its numbers, lie one after the other in memory, and only what a function uses is
 """
 
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, fields
 from functools import cache
@@ -57,6 +58,8 @@ class Block:
         super().__init_subclass__(**options)
         own = {}
         for name, kind in get_annotations(cls).items():
+            if hasattr(Block, name):
+                raise TypeError(f"{cls.__name__}.{name}: every block has something of this name")
             if (dtype := mutable_dtype(kind)) is not None:
                 own[name] = MutableMember(name, dtype)
                 setattr(cls, name, own[name])
@@ -70,6 +73,8 @@ class Block:
     def __post_init__(self) -> None:
         if self.mutable and type(self).__dataclass_params__.frozen:  # type: ignore[attr-defined]
             raise TypeError(f"{type(self).__name__} has mutable numbers, and is frozen")
+        if self.mutable and sys._getframe(2).f_globals.get("__name__") == "dataclasses":
+            raise TypeError("dataclasses.replace would not share mutable numbers: use .replace")
         words: list[int] = []
         members: list[tuple[str, types.Type, int]] = []
         for name, value in self.named().items():
@@ -88,8 +93,8 @@ class Block:
         """A block of these members, and of zeros for every other mutable number and array.
 
         The shape of such an array is annotated: `Annotated[np.ndarray, "nv+1", 3]` is (nv + 1, 3),
-        of which `sizes` has nv; "6nc" is six times nc. A type at
-        the end is that of the numbers, which are floats by default.
+        of which `sizes` has nv; "6nc" is six times nc. A type at the end is that of the numbers,
+        which are floats by default.
         """
         for name, kind in get_type_hints(cls, include_extras=True).items():
             if name in cls.mutable:
@@ -128,7 +133,7 @@ class Block:
         """The values of `named`, in order."""
         return tuple(self.named().values())
 
-    def numbers(self) -> dict[str, float]:
+    def mutable_values(self) -> dict[str, float]:
         """The values of all mutable numbers by name."""
         return {name: getattr(self, name) for name in self.mutable}
 

@@ -120,7 +120,7 @@ def recovery(
     robot = robot_named(name)
     qp = controller(robot, root=root)
     simulation = Simulation(robot)
-    simulation.state_arrays.friction[0] = friction
+    simulation.state_arrays.friction = friction
     ticks, force = [], ExternalForce.allocate()
     force.load[:] = load
     for direction in (0.0, 90.0, 180.0, 250.0):

@@ -73,7 +73,7 @@ def must_step(t: CaptureTick) -> bool:
     if moves(t):
         angle, rate = turned_away(t)
         low = crouch(t)
-        lead = LEAD / s.omega[0] * max(1.0 - low / (DEEP * t.robot.height_com), 0.0)
+        lead = LEAD / s.omega * max(1.0 - low / (DEEP * t.robot.height_com), 0.0)
         if rate > AWAY and angle + lead * rate > g.turn_limit:
             return True
         margin += g.crouch_margin * low * max(1.0 - (angle / g.turn_limit) ** 2, 0.0)

@@ -269,12 +269,12 @@ def test_a_soft_root_is_reported():
         *_, info = env.step(zero(env))
         largest = max(largest, np.abs(info["root_wrench"]).max())
     assert largest > 1.0
-    compiled = env.episode.metrics.numbers()
+    compiled = env.episode.metrics.mutable_values()
     env._compiled = False  # the same in Python
     env.reset(seed=0, options={"push": {**PUSH, "impulse": 25.0, "start": 0.0}})
     for _ in range(10):
         env.step(zero(env))
-    assert env.episode.metrics.numbers() == pytest.approx(compiled, rel=1e-9)
+    assert env.episode.metrics.mutable_values() == pytest.approx(compiled, rel=1e-9)
 
 
 def test_failures_of_the_solver_are_counted_per_episode(env):

@@ -78,7 +78,7 @@ def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
         return Diagnosis("height")
     if uprightness(arrays, s) < env.limits.cos_tilt:
         return Diagnosis("tilt")
-    if env.limits.ground_contact and s.other_contacts[0] > 0.5:
+    if env.limits.ground_contact and s.other_contacts > 0.5:
         return Diagnosis("contact", loss_body=touching_body(env))
     return Diagnosis(loss)
 

@@ -70,7 +70,7 @@ class CourseRecord:
         self._rows.append({
             "time": env.simulation.time, "load": np.abs(env.simulation.views.ctrl) / self._limit,
             "capture_point": s.capture_point.copy(),
-            "supports": s.support[: s.support_size[0]].copy(), "contacts": s.contacts > 0.5,
+            "supports": s.support[: s.support_size].copy(), "contacts": s.contacts > 0.5,
             "soles": s.sole_point[:, :2].copy(), "foothold": foothold, "swinging": foot,
             "failures": float(env.episode.metrics.failures),
         })  # fmt: skip

@@ -104,7 +104,7 @@ def clip_to_limits(q: Search, x: float, y: float, least: float) -> tuple[float, 
 @compiled
 def end_capture_point(q: Search) -> tuple[float, float]:
     """ξ(T) = p + (ξ − p) e^(ωT): the capture point at touchdown [m]."""
-    return drifted_point(q.capture_point, q.cop, q.state.omega[0], q.time)
+    return drifted_point(q.capture_point, q.cop, q.state.omega, q.time)
 
 
 @compiled

@@ -24,7 +24,7 @@ def moving(velocity, offset=(0.0, 0.0)):
     targets = Targets.standing(robot(), simulation.state)
     s.com[:2] = targets.com[:2] + offset
     s.com_vel[:2] = velocity
-    s.capture_point[:] = s.com[:2] + s.com_vel[:2] / s.omega[0]
+    s.capture_point[:] = s.com[:2] + s.com_vel[:2] / s.omega
     return simulation.state, targets
 
 
