@@ -36,8 +36,9 @@ from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.trials.jobs import ANYWHERE
 from poise.training.motion.following.follow import performer
-from poise.training.motion.tracking.record import ANYWHERE, FeetRecord, lies
+from poise.training.motion.tracking.record import FeetRecord, lies
 from poise.training.motion.tracking.reference import ReferenceBodies
 
 CLIPS = tuple(

@@ -53,7 +53,8 @@ def random_term(rng: np.random.Generator, depth: int) -> ScriptTerm:
     if kind < 0.3 and depth:
         body = random_sequence(rng, depth - 1)
     elif kind < 0.4:
-        body = StateName(str(rng.choice(NAMES)))
+        time = round(float(rng.uniform(0.0, 5.0)), 3) if rng.random() < 0.5 else None
+        body = StateName(str(rng.choice([*NAMES, "a b"])), time)
     elif kind < 0.7:
         body = ClipName(str(rng.choice([*NAMES, "достать оружие", "a|b -> #"])), quoted=True)
     else:

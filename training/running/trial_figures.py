@@ -102,7 +102,7 @@ class StepsAsCommanded(TypedDict, total=False):
     """The rate of walks without a fall whose steps are within 10 % of each commanded step
     parameter."""
 
-    steps_as_told_rate: float
+    steps_as_commanded_rate: float
 
 
 class WalkLevel(Rate, StepsAsCommanded, WalkMeans, total=False):

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.problems import out_of_range
 
 from .layers import Layers
 from .motion_graph import MotionGraph, Transition, transition_order
@@ -54,7 +55,7 @@ def best_paths(
 
 def _check(graph: MotionGraph, task: PathTask, k: int) -> None:
     if k < 1:
-        raise ConfigError(f"must be at least 1, not {k}", field="k")
+        raise out_of_range(k, field="k", least=1)
     if not task.actions:
         raise ConfigError("a path needs an action", field="actions", choices=graph.names)
     for name in (*task.actions, *(name for name, _ in (*task.start, *task.goal))):

@@ -58,16 +58,21 @@ class Reader:
     def actions(self) -> Actions:
         """Those of the whole script.
 
+        A posture that is first or last is where the way begins or ends. Any other is an action, a
+        rest in it; so is each of a script of postures alone.
+
         Raises ConfigError with line and column: no such clip, link group or posture, a posture that
-        is neither first nor last, a modifier that cannot be used, more than 1,000 actions.
+        is not alone, a modifier that cannot be used, more than 1,000 actions.
         """
         items = self._flat(self.script.sequence, len(self.script.defines), Arrow())
         states = [state_of(item[1]) for item in items]
+        if all(states):
+            if len(items) == 1:
+                raise self.script.wrong("a script needs a motion or two postures", 0)
+            return self._actions(items)
         start, goal = states[0], states[-1] if len(items) > 1 else None
         inner = items[start is not None : len(items) - (goal is not None)]
-        if not inner:
-            raise self.script.wrong("a script needs a motion, not postures alone", 0)
-        said = "next to a posture no transition is chosen by hand"
+        said = "next to a first or last posture no transition is chosen by hand"
         for state, arrow in ((start, inner[0][0]), (goal, items[-1][0])):
             if state is not None and arrow.kind:
                 raise self.script.wrong(said, arrow.at)
@@ -113,6 +118,8 @@ class Reader:
         """The clip of the stage that an overlay is; made now if the graph has it not."""
         term = overlay.terms[0]
         body, _ = self._body(term, seen)
+        if (state := state_of(overlay)) is not None:
+            return self.stage.hold(state, self.script)
         if len(overlay.terms) == 1 and isinstance(body, ClipName) and not term.modifiers:
             return self._found(body)
         text = overlay_text(overlay)
@@ -140,7 +147,7 @@ class Reader:
         times, modifiers = _repeats(term)
         body, inner = self._body(term, seen)
         if isinstance(body, StateName):
-            raise self.script.wrong("a posture stands first or last, alone", term.at)
+            raise self.script.wrong("a posture stands alone", term.at)
         if times > 1 or isinstance(body, Sequence):
             once = body if isinstance(body, Sequence) else Sequence((Overlay((ScriptTerm(body),)),))
             items = [item for _ in range(times) for item in self._flat(once, inner, Arrow())]

@@ -10,7 +10,6 @@ from poise.baselines.motion.graphs.frames import nearest_places
 from poise.baselines.motion.graphs.joining.joins import JOINS, laid_on
 from poise.baselines.motion.graphs.motion_graph import (
     MotionGraph,
-    StatePlace,
     Transition,
     earliest_part,
     latest_part,
@@ -81,7 +80,7 @@ class Synthesis:
             "duration": clip.duration,
             "cost": plan.paths[0].cost,
             "made": sorted(self.stage.derived),
-            "played": [asdict(part) for part in parts],
+            "parts": [asdict(part) for part in parts],
             "others": [{"cost": path.cost, "clips": [step.clip for step in path.steps]}
                        for path in plan.paths[1:]],
         }  # fmt: skip
@@ -163,13 +162,7 @@ class Synthesis:
     def _places(self, state: StateName | None, script: Script) -> dict[Place, float]:
         if state is None:
             return {}
-        states = self.stage.graph.states
-        place = states.get(state.name)
-        if place is None and (name := self.stage.find(state.name)) is not None:
-            place = StatePlace(name)  # how the clip begins
-        if place is None:
-            raise script.wrong(f"no posture {shown(state.name)}", state.at,
-                               [*states, *self.stage.packed])  # fmt: skip
+        place = self.stage.place(state, script)
         posture = self.stage.posture(place.clip, place.time)
         with script.blamed(state.at):
             return nearest_places(self.stage.frames, posture,

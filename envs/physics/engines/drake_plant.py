@@ -67,10 +67,12 @@ class DrakePlant:
         self.robot, model = robot, robot.model
         self._stiffness = 2.0 * robot.mass * robot.units.gravity / physics.sink
         self._relaxation, self._softer = physics.relaxation, softer
+        self._dissipation = float(physics.dissipation)
         builder = DiagramBuilder()
         config = MultibodyPlantConfig()
         config.time_step = float(model.opt.timestep) / physics.substeps
-        config.discrete_contact_approximation = "sap"
+        config.discrete_contact_approximation = physics.contact
+        config.stiction_tolerance = physics.slip
         config.contact_model = "point"
         config.use_sampled_output_ports = False  # forces of the step that begins, not of the last
         config.adjacent_bodies_collision_filters = False  # the pairs are MuJoCo's
@@ -194,8 +196,8 @@ class DrakePlant:
     def _material(self, friction: float, geom: int | None) -> ProximityProperties:
         """The material of a geom, or of the ground: None.
 
-        The stiffness of a contact is k₁ k₂/(k₁ + k₂), its relaxation time τ₁ + τ₂: the ground has
-        none, two geoms have both.
+        The stiffness of a contact is k₁ k₂/(k₁ + k₂), its dissipation (d₁ k₂ + d₂ k₁)/(k₁ + k₂),
+        its relaxation time τ₁ + τ₂: the ground has none, two geoms have both.
         """
         stiffness = self._stiffness / (1.0 if geom is None else self._softer[geom] ** 2)
         properties = ProximityProperties()
@@ -203,6 +205,7 @@ class DrakePlant:
         properties.AddProperty("material", "point_contact_stiffness", stiffness)
         relaxation = 0.0 if geom is None else self._relaxation
         properties.AddProperty("material", "relaxation_time", relaxation)
+        properties.AddProperty("material", "hunt_crossley_dissipation", self._dissipation)
         return properties
 
     def _filter(self) -> None:

@@ -32,9 +32,9 @@ class Diagnosis:
     loss_body: str | None = None  #: that touched the ground, where that is the criterion
     #: motor between root and soles that was first at its limit after the first push, for 2 policy
     #: steps or more in a row. Arms are swung as hard as they can be, which is no reason to fall
-    full_motor: str | None = None
-    full_from: float | None = None  #: when that began
-    full_time: float | None = None  #: how long it lasted then
+    saturated_motor: str | None = None
+    saturated_from: float | None = None  #: when that began
+    saturated_time: float | None = None  #: how long it lasted then
     capture_left: float | None = None  #: when the capture point left the support for the last time
     capture_outside: float | None = None  #: how far outside it came at most from then on [m]
     #: "slipped" (a sole moved by 3 cm while it stood) or "missed" (a foot landed 5 cm or more from
@@ -109,9 +109,9 @@ def _saturated(env: BalanceEnv, course: TrialCourse, start: float) -> dict[str, 
     # of those that begin together the longest
     first, last, motor = min(lasting, key=lambda run: (run[0], -run[1]))
     return {
-        "full_motor": env.robot.motor_names[motor],
-        "full_from": _time(course, first),
-        "full_time": round((last - first) * env.config.policy_period, 6),
+        "saturated_motor": env.robot.motor_names[motor],
+        "saturated_from": _time(course, first),
+        "saturated_time": round((last - first) * env.config.policy_period, 6),
     }
 
 

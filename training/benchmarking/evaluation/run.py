@@ -19,6 +19,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
+from poise.configs.problems import out_of_range
 from poise.configs.schema import to_dict
 from poise.envs.physics.engines.config import MUJOCO, Physics, load_physics
 from poise.envs.physics.engines.engine import check_engine
@@ -311,7 +312,7 @@ def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | N
         check_name(name)
     for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
         if value is not None and value < least:
-            raise ConfigError(f"must be at least {least}, not {value}", field=name)
+            raise out_of_range(value, name, least=least)
     if trials is not None and trials > MOST_TRIALS:
         raise ConfigError(f"must be at most {MOST_TRIALS}", field="trials")
 

@@ -61,7 +61,7 @@ def controller_entry(
         **counts(rated(evaluated)),
         "criterion": NOT_FALLEN if by_falls(rated(evaluated)) else RECOVERED,
         "root_force_max": max((outcome.root_force or 0.0) for _, outcome in evaluated),
-        "played": len(everything),
+        "evaluated": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
     if found := losses((o, o.steps) for t, o in evaluated if not is_won(t, o)):

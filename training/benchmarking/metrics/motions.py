@@ -6,21 +6,16 @@ from typing import Any, cast
 
 import numpy as np
 
+from poise.baselines.extras import load_extra
 from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
 from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.statistics.rates import mean_or_none, wilson_interval
 from poise.training.benchmarking.suites.motions import PART, STANDING
 from poise.training.benchmarking.suites.suite import Suite
-from poise.training.benchmarking.trials.jobs import TrialStage
+from poise.training.benchmarking.trials.jobs import LONGEST, TrialStage
+from poise.training.benchmarking.trials.repertoire import Repertoire, kept
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.motion.following.follow import LONGEST
-from poise.training.motion.following.repertoire import (
-    Repertoire,
-    is_clip,
-    kept,
-    load_repertoire,
-)
 from poise.training.running.trial_figures import InMotion, MotionLevel, MotionMeans
 
 from .evaluated import Evaluated, cells, fitted, pushes, trials_of_parts, won
@@ -29,10 +24,23 @@ MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level ha
 
 
 def suite_repertoire(suite: Suite, robot: Robot, folder: Path, overwrite: bool) -> Repertoire:
-    """Return the motions of a suite, empty where it has none; raise as `load_repertoire`."""
+    """Return the motions of a suite, empty where it has none.
+
+    Raises:
+        MissingExtra: poise[motion] is not installed.
+        ConfigError: as `load_repertoire` of `training/motion/following/repertoire.py`.
+    """
     if suite.motions is None:
         return Repertoire({}, {}, {})
-    return load_repertoire(suite.motions.names, suite.motions.labels, robot, folder, overwrite)
+    names, labels = suite.motions.names, suite.motions.labels
+    load = _of_motions().load_repertoire
+    repertoire: Repertoire = load(names, labels, robot, folder, overwrite)
+    return repertoire
+
+
+def _of_motions() -> Any:
+    """Return the module `training/motion/following/repertoire.py`; raises MissingExtra."""
+    return load_extra("motions", "repertoire", "a suite that performs motions")
 
 
 def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> TrialStage:
@@ -41,6 +49,7 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> TrialStage:
     if chosen is None:
         again = suite.get_up_time or (None if suite.get_up is None else 0.0)
         return TrialStage(robot, suite.duration, suite.noise, get_up=again, physics=suite.physics)
+    is_clip = _of_motions().is_clip
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
     motions = ((STANDING, STANDING), *files)

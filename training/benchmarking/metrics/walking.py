@@ -40,7 +40,7 @@ def _level(name: str, text: str, evaluated: Evaluated, duration: float) -> WalkL
     steps: StepsAsCommanded = {}
     if name == "gait":
         kept = [each.upright and (each.step_error or 0.0) <= STEP_TOLERANCE for each in outcomes]
-        steps = {"steps_as_told_rate": sum(kept) / len(kept)}
+        steps = {"steps_as_commanded_rate": sum(kept) / len(kept)}
     return {
         "part": name,
         "level": text,

@@ -192,12 +192,19 @@ def _realism(entry: Entry) -> Iterator[tuple[str, str]]:
 
 
 def _factors(summary: Summary) -> Table:
+    """Return the recovered rates at each level: the standard's once, since its trials are those of
+    every factor, and no realism levels, which are columns of the ranking."""
     names = summary["ranking"]
     found = [summary["controllers"][name].get("factors", []) for name in names]
+    standard: dict[tuple[str, ...], list[str]] = {}
     rows = []
     for factors in zip(*found, strict=True):
         for levels in zip(*(factor["levels"] for factor in factors), strict=True):
-            mark = " (standard)" if levels[0]["standard"] else ""
-            rates = (f"{level['recovered_rate']:.0%}" for level in levels)
-            rows.append([plain(factors[0]["factor"]), plain(levels[0]["level"]) + mark, *rates])
-    return ["factor", "level", *(code(name) for name in names)], rows
+            factor, level = plain(factors[0]["factor"]), plain(levels[0]["level"])
+            rates = tuple(f"{level['recovered_rate']:.0%}" for level in levels)
+            if levels[0]["standard"]:
+                standard.setdefault(rates, []).append(f"{factor} {level}")
+            elif factors[0]["factor"] != "realism":
+                rows.append([factor, level, *rates])
+    first = [["standard", ", ".join(where), *rates] for rates, where in standard.items()]
+    return ["factor", "level", *(code(name) for name in names)], [*first, *rows]

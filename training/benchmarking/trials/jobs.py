@@ -11,12 +11,14 @@ from poise.baselines.balance.references.tempo import Tempo
 from poise.envs.balance.config import StartNoise
 from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.motion.tracking.record import ANYWHERE
 
 from .agents import Agent, load_agent
 from .play import run_trial
 from .trial import Outcome, Trial, failed_trial
 from .variants import AgentVariants
+
+LONGEST = 600.0  # [s] of a trial that performs a motion
+ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an episode
 
 
 @dataclass(frozen=True)

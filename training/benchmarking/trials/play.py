@@ -5,18 +5,18 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.extras import load_extra
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis, diagnose
 from poise.training.benchmarking.diagnosis.record import CourseRecord, swing_of
-from poise.training.motion.tracking.record import Tracking
 
 from .agents import Agent
 from .gait_figures import NO_ERROR, SWING_TIME, RecordedWalk, TrackingError, near
@@ -29,6 +29,26 @@ FOOT_DISPLACED = 0.05  # [m]
 TINY = 1e-9  # [s]
 SETTLED = 1.0  # [s] after which actions and drift count
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
+
+
+class Tracking(Protocol):
+    """The record of a performed motion, which `poise[motion]` makes.
+
+    Attributes:
+        fallen: whether the robot fell, for what the motion does at that time.
+        ended: whether the trial is over.
+    """
+
+    fallen: bool
+
+    @property
+    def ended(self) -> bool: ...
+
+    def update(self) -> None:
+        """Record a policy step."""
+
+    def figures(self) -> Any:
+        """Return the fields of `Outcome` that are of motions, as a dataclass."""
 
 
 class SteppedTrial:
@@ -48,7 +68,8 @@ class SteppedTrial:
             agent.begin()
         self.tracking: Tracking | None = None
         if trial.motion is not None and isinstance(env, ResidualBalanceEnv):
-            self.tracking = Tracking(env, [push.start for push in trial.pushes])
+            tracking = load_extra("motions", "tracking", f"the motion {trial.motion!r}")
+            self.tracking = tracking(env, [push.start for push in trial.pushes])
 
     def step(self) -> np.ndarray:
         """Take a policy step; returns its action (na,). Raises what the controller raises."""
@@ -269,11 +290,11 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         root_force=_finite(m.root_force),
         edge_contacts=int(m.edge_contacts),
         surfaces_passed=surfaces_passed(env),
-        drawn=drawn_robot(env),
+        randomised=randomised_robot(env),
     )
 
 
-def drawn_robot(env: BalanceEnv) -> str | None:
+def randomised_robot(env: BalanceEnv) -> str | None:
     """Return the parameters of the episode's randomised robot as JSON; None without any."""
     return None if env.drawn is None else json.dumps(env.drawn.summary(env.arrays.timestep))
 

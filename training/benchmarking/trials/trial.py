@@ -183,7 +183,7 @@ class TrialFigures:
     up_again: bool | None = None
     up_time: float | None = None  #: from the fall, or the start on the ground, until it was up
     #: parameters of a randomised robot as JSON, see `DrawnRobot.summary`
-    drawn: str | None = None
+    randomised: str | None = None
     #: exception of the controller on one line; the trial then counts as not recovered
     error: str | None = None
 
@@ -199,6 +199,15 @@ class Outcome(Diagnosis, TrialFigures):
 
     Bases are listed from the last field to the first, as dataclasses collect them.
     """
+
+
+#: older name → name of fields of `Outcome`, which are columns of trials.csv (`respelled`)
+FORMER = {
+    "full_motor": "saturated_motor",
+    "full_from": "saturated_from",
+    "full_time": "saturated_time",
+    "drawn": "randomised",
+}
 
 
 def counts_as_won(trial: Trial, outcome: Outcome) -> bool:

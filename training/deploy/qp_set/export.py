@@ -18,8 +18,9 @@ from poise.baselines.solvers import QP
 from poise.baselines.whole_body import formulation
 from poise.baselines.whole_body.constraint_rows import torque_matrix
 from poise.baselines.whole_body.momentum_qp import MomentumQP
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import PoiseError
 from poise.configs.files import check_new_folder, new_folder
+from poise.configs.problems import out_of_range
 from poise.configs.schema import to_dict
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
@@ -105,9 +106,9 @@ def write_qp_set(
     """
     out = Path(out)
     if count < 1:
-        raise ConfigError(f"must be at least 1, not {count}", field="count")
+        raise out_of_range(count, field="count", least=1)
     if seed < 0:
-        raise ConfigError(f"must be at least 0, not {seed}", field="seed")
+        raise out_of_range(seed, field="seed", least=0)
     check_new_folder(out)
     body = load_robot(robot)
     limits = load_limits(body)

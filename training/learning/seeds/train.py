@@ -13,6 +13,7 @@ from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_folder
+from poise.configs.problems import out_of_range
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.rates import seed_figures
@@ -66,7 +67,7 @@ def train_seeds(
     check_out_folder(out)
     check_backend(backend)
     if workers is not None and workers < 1:
-        raise ConfigError(f"must be at least 1, not {workers}", field="workers")
+        raise out_of_range(workers, field="workers", least=1)
     given, seeds = seeds, _all_seeds(seeds, out, resume)
     runs = [SeedRun(replace(config, seed=seed, threads=1), out / f"seed-{seed}") for seed in seeds]
     for run in runs:
@@ -139,7 +140,7 @@ def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
     """Return the seeds of the folder and the given ones; refuses what is no list of seeds."""
     for seed in seeds:
         if seed < 0:
-            raise ConfigError(f"must be at least 0, not {seed}", field="seeds")
+            raise out_of_range(seed, field="seeds", least=0)
         if list(seeds).count(seed) > 1:
             raise ConfigError(f"{seed} is given twice", field="seeds")
     if find_checkpoint(out / LAST) is not None:

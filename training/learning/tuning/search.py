@@ -17,6 +17,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.extras import needing
 from poise.configs.files import resolve, write_atomic
 from poise.configs.outputs import check_out_folder
+from poise.configs.problems import out_of_range
 from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.robots.robot import load_robot
@@ -82,7 +83,7 @@ def tune(
     process searches there, or a file cannot be written.
     """
     if minutes is not None and not minutes > 0.0:
-        raise ConfigError(f"must be above 0, not {minutes}", field="minutes")
+        raise out_of_range(minutes, field="minutes", above=0)
     check_out_folder(out)
     _known(config, out, resume)  # what is refused makes no folder
     gains = Gains(config.controller, config.gains, config.robot)

@@ -19,7 +19,6 @@ AFTER = 3.0  # [s] that a trial goes on after the motion's end: a fall takes its
 SETTLING = 6.0  # [s] that it goes on after a push at least: steps home take as long
 LIFTED = 5  # policy steps off the ground after which a sole counts as landing again: 0.1 s
 LANDING = 25  # policy steps after which feet of a disturbed start have landed
-ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an episode
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import yaml
 
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.robot_clip import check_clip_robot, read_robot_clip
+from poise.baselines.extras import load_extra
 from poise.baselines.walking.schedule import parse_commands
 from poise.configs.errors import ConfigError, shown
 from poise.configs.yaml_loader import Loader
@@ -41,6 +42,7 @@ def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: Non
         seen = clip
     elif spec.motion != STANDING:
         motion = load_motion(spec.motion, robot)
+        load_extra("motions", "performer", f"the motion {motion.name!r}")  # before all that waits
     say(f"loading {', '.join(spec.controllers)}")
     session = load_session(
         spec.controllers, robot, spec.seed, pushes, commands=commands, motion=motion,

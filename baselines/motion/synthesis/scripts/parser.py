@@ -131,9 +131,16 @@ class _Parser:
 
     def state(self) -> StateName:
         at = self.take().at
-        name = self.expect("name", "the name of a posture")
+        if self.next.kind == "string":
+            name = self.quoted().name
+        else:
+            name = self.expect("name", "the name of a posture").text
+        time = None
+        if self.next.text == "@":
+            self.take()
+            time = self.number("[")
         self.sign(">")
-        return StateName(name.text, at)
+        return StateName(name, time, at)
 
     def bracket(self) -> Sequence:
         opening = self.take()

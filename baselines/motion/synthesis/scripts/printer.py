@@ -54,7 +54,8 @@ def body_text(body: ClipName | StateName | Sequence) -> str:
     if isinstance(body, Sequence):
         return f"({sequence_text(body)})"
     if isinstance(body, StateName):
-        return f"<{body.name}>"
+        name = body.name if body.name.isidentifier() else body_text(ClipName(body.name, True))
+        return f"<{name}>" if body.time is None else f"<{name} @ {number_text(body.time)}>"
     if '"' in body.name or "\n" in body.name:
         raise ConfigError(f"cannot be quoted: {shown(body.name)}", field="clip")
     return f'"{body.name}"' if body.quoted else body.name

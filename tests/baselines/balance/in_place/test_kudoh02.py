@@ -9,8 +9,8 @@ from poise.baselines.balance.in_place.kudoh02 import Kudoh02, Kudoh02Config
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import (
-    KINDS,
     controller_config,
+    kinds,
     load_controller,
     momentum_qp_config,
 )
@@ -116,6 +116,6 @@ def test_some_commands_need_a_momentum_qp():
 
 def test_every_kind_is_packaged():
     """Each kind but those from outside has a file; `qp: momentum-qp` stands for its gains."""
-    kinds = {controller_config(name).kind for name in packaged("controllers")}
-    assert kinds | {"outside", "policy-file"} == set(KINDS)
+    found = {controller_config(name).kind for name in packaged("controllers")}
+    assert found | {"outside", "policy-file"} == set(kinds())
     assert controller_config("lqr-lip").qp == controller_config("momentum-qp")

@@ -110,10 +110,10 @@ def test_the_summary_has_what_readers_rely_on(finished: Path) -> None:
             "workers", "backend", "commit", "seconds"} == set(summary)  # fmt: skip
     assert summary["ranking"] == list(BOTH) and summary["reference"] == "momentum-qp"
     entry = summary["controllers"]["momentum-qp"]
-    assert {"trials", "played", "errors", "root_force_max", "tick_us", "fingerprint", "j50_mean",
+    assert {"trials", "evaluated", "errors", "root_force_max", "tick_us", "fingerprint", "j50_mean",
             "j50_mean_ci95", "eta_mean", "eta_mean_ci95", "eta_min", "directions", "factors",
             "eurobench"} <= set(entry)  # fmt: skip
-    assert entry["played"] == TRIALS and entry["errors"] == 0 and entry["tick_us"] == 12.5
+    assert entry["evaluated"] == TRIALS and entry["errors"] == 0 and entry["tick_us"] == 12.5
     assert summary["rated"] == "mix" and entry["trials"] == 2
     assert [d["trials"] for d in entry["directions"]] == [4, 4]
     for d in entry["directions"]:

@@ -198,7 +198,7 @@ def test_one_command_plays_what_the_other_has_suites_for(
         ("zero", "pd"), ("zero", "momentum-qp"), ("pd", "momentum-qp"),
     ]  # fmt: skip
     for entry in summary["controllers"].values():
-        assert entry["trials"] == 2 and entry["played"] == TRIALS and entry["factors"]
+        assert entry["trials"] == 2 and entry["evaluated"] == TRIALS and entry["factors"]
     assert (tmp_path / "out/polar_envelope.png").exists()
 
 
@@ -298,9 +298,9 @@ def test_a_suite_is_played_again_at_levels(tmp_path: Path, in_process: type[InPr
         if name == "momentum-qp":  # of the other, nothing stands
             assert ideal["torque_variation_median"] < field["torque_variation_median"]
         assert field["unpushed"] == 2
-        assert entry.pop("played") == 2 * alone["controllers"][name]["played"]
+        assert entry.pop("evaluated") == 2 * alone["controllers"][name]["evaluated"]
         before: dict[str, Any] = dict(alone["controllers"][name])
-        before.pop("played")
+        before.pop("evaluated")
         for each in (entry, before):
             each.pop("losses", None)
         assert entry == before

@@ -62,7 +62,7 @@ def entry(outcomes: list[bool], j50: float) -> Entry:
     compared: Compared = {"lost": 0, "won": 0, "p_mcnemar": 1.0}
     return {
         **rate(sum(outcomes), len(outcomes)),
-        "played": 4, "errors": 0, "root_force_max": 0.5, "tick_us": 80.0, "fingerprint": "0",
+        "evaluated": 4, "errors": 0, "root_force_max": 0.5, "tick_us": 80.0, "fingerprint": "0",
         "j50_mean": j50, "j50_mean_ci95": (j50 - 1, j50 + 1), "j50_mean_per_mass": j50 / 40,
         "j50_min": 9.0, "j50_bounded": 0,
         "eta_mean": 0.7, "eta_mean_ci95": (0.6, 0.8), "eta_min": 0.5,
@@ -142,7 +142,7 @@ def test_trials_with_other_pushes_are_no_pairs(tmp_path: Path) -> None:
     for folder in folders:
         summary = json.loads((folder / "summary.json").read_text())
         (whole,) = summary["controllers"].values()
-        keys = ("trials", "recovered", "recovered_rate", "recovered_ci95", "played", "errors")
+        keys = ("trials", "recovered", "recovered_rate", "recovered_ci95", "evaluated", "errors")
         summary["controllers"]["pd"] = {key: whole[key] for key in keys}
         (folder / "summary.json").write_text(json.dumps(summary | {"rated": None}))
     lines = (folders[2] / "trials.csv").read_text().splitlines()
@@ -253,7 +253,7 @@ def test_levels_are_compared_with_the_standard_case_on_the_same_trials() -> None
     played[1] = (played[1][0], replace(OUTCOME, root_force=12.5))  # outside of the mix
     entry = controller_entry(played, plan)
     assert entry["root_force_max"] == 12.5 and entry["trials"] == 2
-    assert entry["errors"] == len(lost) and entry["played"] == len(played)
+    assert entry["errors"] == len(lost) and entry["evaluated"] == len(played)
     (delay,) = (f for f in entry["factors"] if f["factor"] == "delay")
     standard, level = delay["levels"]
     assert (standard["level"], standard["recovered_rate"]) == ("0", 1.0)

@@ -106,8 +106,8 @@ def test_a_result_is_the_same_in_any_order_and_is_played_again(
     assert all(each["trials"] == EACH[each["scenario"]]["trials"] for each in walker)
     results = load_results(tmp_path / "a")
     told = {record.trial: record.line for record in results.of("walk")}
-    assert '"arms": 0.' in told[3]["drawn"] and '"hand": 0.0' in told[5]["drawn"]
-    assert told[1]["drawn"] == "" and told[0]["until"] == "4.2"
+    assert '"arms": 0.' in told[3]["randomised"] and '"hand": 0.0' in told[5]["randomised"]
+    assert told[1]["randomised"] == "" and told[0]["until"] == "4.2"
     assert told[0]["fallen"] == "False"
     lasted = float(told[0]["energy"]) / float(told[0]["mean_power"])
     assert lasted == pytest.approx(4.2, abs=0.01)

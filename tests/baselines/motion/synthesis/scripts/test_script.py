@@ -118,7 +118,8 @@ def grammar() -> pp.ParserElement:
     words = pp.Keyword("on") + name + pp.ZeroOrMore("," + name) | pp.Keyword("mirrored")
     signs = pp.one_of("* @") + number | "[" + number + ":" + number + "]"
     modifier = words | pp.Keyword("weight") + number | signs
-    term = (text | name | "<" + name + ">" | "(" + sequence + ")") + pp.ZeroOrMore(modifier)
+    state = "<" + (text | name) + pp.Optional("@" + number) + ">"
+    term = (text | name | state | "(" + sequence + ")") + pp.ZeroOrMore(modifier)
     overlay = term + pp.ZeroOrMore("|" + term)
     sequence <<= overlay + pp.ZeroOrMore(arrow + overlay)
     script = pp.ZeroOrMore((text | name) + "=" + sequence + ";") + sequence + pp.StringEnd()
@@ -274,7 +275,7 @@ def test_scripts_in_files(tmp_path) -> None:
 
 def test_the_clips_of_a_script_are_known_by_name() -> None:
     script = parse('both = (kick | "a b" on arms) * 2; <up> -> both -> (walk[0:1] -> stand) @ 2')
-    assert clip_names(script) == {"kick", "a b", "both", "walk", "stand"}
+    assert clip_names(script) == {"kick", "a b", "both", "up", "walk", "stand"}
 
 
 def test_a_table_is_read_back_and_may_be_edited(tmp_path: Path) -> None:
