@@ -54,7 +54,7 @@ def main(args: Sequence[str] | None = None) -> int:
         try:
             return _stoppable(args)
         except PoiseError as error:
-            report(error)
+            print_error(error)
             return 2
         finally:
             if sys.stdout is not None:  # poise list >&-
@@ -69,7 +69,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return 141
 
 
-def report(error: PoiseError) -> None:
+def print_error(error: PoiseError) -> None:
     """Print an error as the one line that it is."""
     print(f"poise: {error}", file=sys.stderr)
 

@@ -92,7 +92,7 @@ class Command:
 def run_train(args: Sequence[str]) -> None:
     """Parse and train, or print the help; raises ConfigError."""
     if {"-h", "--help", "--help-all"} & set(args):
-        print_help(train_config(_base(args)), everything="--help-all" in args)
+        print_train_help(train_config(_base(args)), everything="--help-all" in args)
         return
     command = parse_train(args)
     out, allow = command.out, [*named(_peek(args).controller), *command.allow]
@@ -176,7 +176,7 @@ def options(config: TrainConfig) -> list[Option]:
     return [*own, *options_of(config)]
 
 
-def print_help(config: TrainConfig, everything: bool) -> None:
+def print_train_help(config: TrainConfig, everything: bool) -> None:
     """The options that a first run needs, or all in groups, with the defaults of `config`."""
     console, found = terminal(), options(config)
     print_lines("usage: poise train --out PATH [OPTIONS]", console)

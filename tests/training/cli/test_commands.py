@@ -207,7 +207,7 @@ def bad_input(
     Path("robot.yaml").write_text(BAD_ROBOT)
     Path("run").mkdir()
     errors: list[PoiseError] = []
-    before = entry.report
+    before = entry.print_error
     monkeypatch.setattr(entry, "report", lambda error: (errors.append(error), before(error)))
     assert main(args) == 2
     (error,) = errors

@@ -31,7 +31,7 @@ SETTLED = 1.0  # [s] after which actions and drift count
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
 
 
-class Tracking(Protocol):
+class TracksMotion(Protocol):
     """The record of a performed motion, which `poise[motion]` makes.
 
     Attributes:
@@ -66,7 +66,7 @@ class SteppedTrial:
         self._observation, _ = env.reset(seed=trial.seed, options=trial.options)
         if agent.begin is not None:
             agent.begin()
-        self.tracking: Tracking | None = None
+        self.tracking: TracksMotion | None = None
         if trial.motion is not None and isinstance(env, ResidualBalanceEnv):
             tracking = load_extra("motions", "tracking", f"the motion {trial.motion!r}")
             self.tracking = tracking(env, [push.start for push in trial.pushes])
@@ -248,7 +248,7 @@ def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
     return outcome
 
 
-def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
+def followed(env: BalanceEnv, outcome: Outcome, tracking: TracksMotion) -> Outcome:
     """Return the outcome of a trial that performs a motion: `recovered` is to have not fallen."""
     figures: dict[str, Any] = {
         name: _finite(value) for name, value in asdict(tracking.figures()).items()
