@@ -208,7 +208,7 @@ def bad_input(
     Path("run").mkdir()
     errors: list[PoiseError] = []
     before = entry.print_error
-    monkeypatch.setattr(entry, "report", lambda error: (errors.append(error), before(error)))
+    monkeypatch.setattr(entry, "print_error", lambda error: (errors.append(error), before(error)))
     assert main(args) == 2
     (error,) = errors
     assert capsys.readouterr().err == f"poise: {error}\n" and "\n" not in str(error)
