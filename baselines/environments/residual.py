@@ -218,7 +218,7 @@ class ResidualBalanceEnv(ControlledEnv):
         `info["stand_in"]` names it.
         """
         config = getattr(self._known, "config", None)
-        if is_replaced(config, level):
+        if config is not None and is_replaced(config, level):
             return str(config.uncertain)
         return None
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,9 @@ def allocate_gait(
     if limits is None:
         numbers["speed_margin"] = np.inf
     command = guarded_zeros(ENTRIES)
-    parts = {f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)}
+    parts: dict[str, Any] = {
+        f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)
+    }
     return Gait.allocate(
         **numbers,
         command=command,
