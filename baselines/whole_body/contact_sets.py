@@ -93,7 +93,7 @@ class ContactSets(BoundQP):
         ws = chosen.workspace
         problem = self.new_assembly(chosen.arrays, own, chosen.parameters, targets, ws, s, tasks)
         return ContactTick.allocate(
-            {"nc": len(soles)}, problem=problem, memory=self.memory,
+            {"nc": len(soles)}, problem=problem, memory=self.memory, posture=self.posture,
             applied=self.applied, slew=self.slew, follows=self.follows, chosen=self.chosen,
             index=chosen.index, assemble=address_of(assemble, problem), solve=address_of(solve, ws),
         )  # fmt: skip

@@ -120,6 +120,13 @@ class Block:
         object.__setattr__(self, name, value)
         self._memory[word] = np.float64(value).view(np.int64)  # type: ignore[attr-defined]
 
+    def replace_block(self, name: str, block: "Block") -> None:
+        """Exchange a block for another one of its type between two calls of compiled code."""
+        kind, word = self.numba_type.members[name]
+        assert kind == block.numba_type, name
+        object.__setattr__(self, name, block)
+        self._memory[word] = block.address  # type: ignore[attr-defined]
+
     def named(self) -> dict[str, Any]:
         """The fields' values by name; for a mutable number the array (1,) that holds it."""
         held = vars(self)

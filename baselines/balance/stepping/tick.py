@@ -144,7 +144,7 @@ def replan_swing(t: CaptureTick) -> None:
 
 
 @compiled
-def swing_tick(t: CaptureTick) -> None:
+def step_tick(t: CaptureTick) -> None:
     """A tick in a step: first the foot gives its load away, then it swings."""
     s, m, g, w, q = t.state, t.memory, t.gains, t.swing, t.search
     foot, level = m.foot, m.level_frame
@@ -220,7 +220,7 @@ def capture_tick(t: CaptureTick) -> None:
         if foot >= 0:
             lower_foot(t, foot)
     if m.swinging:
-        swing_tick(t)
+        step_tick(t)
     else:
         double_support_tick(t)
     t.failures = t.standing.memory.failures + t.on_both.memory.failures

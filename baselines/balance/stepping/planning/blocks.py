@@ -91,6 +91,14 @@ class Recentring(Block):
     capture_target: Annotated[np.ndarray, 2]  # where ξ is brought [m]
 
 
+#: of `StepGains` those that the legs' limits give, in a step and in a gait
+LEG_NUMBERS = ("leg_length", "root_accel", "swing_accel", "joint_accel")
+#: of `StepLimits` those that a `Search` has
+SEARCHED = (
+    "ahead", "behind", "width_min", "width_max", "speed", "side_speed", "time_min", "time_max",
+)  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class StepGains(Block):
     """The gains of a `CaptureStepConfig` in SI units."""
