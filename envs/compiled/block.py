@@ -36,10 +36,6 @@ from .copies import portable
 from .memory import guarded_zeros
 from .mutable import MutableMember, mutable_dtype
 
-#: kept for `baselines/whole_body`
-Number = Annotated[np.ndarray, 1]
-Integer = Annotated[np.ndarray, 1, np.int64]
-
 
 class Block:
     """Base of dataclasses of arrays, floats, ints, bools and other blocks.
