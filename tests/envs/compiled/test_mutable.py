@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import FrozenInstanceError, dataclass, replace
+from typing import Any
 
 import numba
 import numpy as np
