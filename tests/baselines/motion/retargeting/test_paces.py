@@ -7,7 +7,8 @@ import pytest
 
 from poise.baselines.balance.references.robot_clip import reference_from
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts
+from poise.baselines.motion.retargeting.leaps import find_leaps
 from poise.baselines.motion.retargeting.paces import find_paces
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
@@ -60,6 +61,16 @@ def test_made_clips_become_motions_with_their_steps(name: str, stride: float, tu
     assert end.com[0, :2] - footing.sample(0.0).com[0, :2] == pytest.approx(way, abs=0.25)
     for foot, lift, land in swings(footing):
         assert footing.sample(0.5 * (lift + land)).places[foot, 0, 2] > 0.03
+
+
+def test_a_hop_of_less_than_a_tenth_of_a_second_is_stepped() -> None:
+    """A jump of 0.48 s, seven times as fast: neither a jump nor a reason to refuse the clip."""
+    clip = make("jump")[0].at_speed(7.0)
+    planted = measure_contacts(clip).planted
+    assert 0.0 < longest_flight(planted, clip.dt)[1] < 0.1
+    assert find_leaps(clip) == []
+    with pytest.raises(ConfigError, match="take no step"):  # both feet stay where they are
+        find_paces(clip)
 
 
 def test_flights_and_whole_turns_are_refused() -> None:
