@@ -43,8 +43,7 @@ class Leap(NamedTuple):
 
 
 def find_leaps(clip: Clip) -> list[Leap]:
-    """The jumps with both feet of a clip, in order; none for one that walks or stands, or is off the
-    ground for less than 0.1 s at a time.
+    """The jumps with both feet of a clip, in order: flights of 0.1 s or more.
 
     Raises ConfigError for one that runs: one foot swings before the flight.
     """

@@ -57,8 +57,8 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     run is walked.
 
     Raises:
-        ConfigError: both feet leave the ground at once, or for 0.6 s; it takes no two steps, goes nowhere, or a
-            robot reaches less than `least` of its speed.
+        ConfigError: both feet leave the ground at once, or for 0.6 s; it takes no two steps, goes
+            nowhere, or a robot reaches less than `least` of its speed.
     """
     planted = grounded(measure_contacts(clip).planted, clip.dt)
     run = _run(clip, planted)
