@@ -8,7 +8,7 @@ import pytest
 from poise.baselines.balance.references.robot_clip import reference_from
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts
-from poise.baselines.motion.retargeting.leaps import find_leaps
+from poise.baselines.motion.retargeting import leaps, paces
 from poise.baselines.motion.retargeting.paces import find_paces
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
@@ -63,13 +63,27 @@ def test_made_clips_become_motions_with_their_steps(name: str, stride: float, tu
         assert footing.sample(0.5 * (lift + land)).places[foot, 0, 2] > 0.03
 
 
-def test_a_hop_of_less_than_a_tenth_of_a_second_is_stepped() -> None:
-    """A jump of 0.48 s, seven times as fast: neither a jump nor a reason to refuse the clip."""
-    clip = make("jump")[0].at_speed(7.0)
-    planted = measure_contacts(clip).planted
+def test_a_flight_of_less_than_a_tenth_of_a_second_is_stepped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As in dances: the other foot leaves 0.07 s before one lands. Feet land when they did."""
+    clip = make("backwards")[0]
+    contacts, before = measure_contacts(clip), find_paces(clip)
+    planted, early = contacts.planted.copy(), round(0.07 / clip.dt)
+    for pace in before[:-1]:
+        land = round(pace.land / clip.dt)
+        planted[land - early : land + 1, 1 - pace.foot] = False
     assert 0.0 < longest_flight(planted, clip.dt)[1] < 0.1
-    assert find_leaps(clip) == []
-    with pytest.raises(ConfigError, match="take no step"):  # both feet stay where they are
+    for module in (paces, leaps):
+        monkeypatch.setattr(
+            module, "measure_contacts", lambda _: contacts._replace(planted=planted)
+        )
+    assert leaps.find_leaps(clip) == []
+    after = find_paces(clip)
+    assert [p.foot for p in after] == [p.foot for p in before]
+    assert [p.land for p in after] == pytest.approx([p.land for p in before], abs=0.08)
+    planted[land - round(0.12 / clip.dt) : land + 1, 1 - pace.foot] = False
+    with pytest.raises(ConfigError, match="both feet are off the ground for 0.1"):
         find_paces(clip)
 
 

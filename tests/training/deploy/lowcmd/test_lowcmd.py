@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from poise.training.deploy.lowcmd.ground import LegForces
 from poise.training.deploy.lowcmd.messages import LowCmd, checksum, mpeg2
 from poise.training.deploy.lowcmd.simulated import LowCmdRobot
 from tests.support.physics import robot_named
+from tests.support.small_urdf import write_urdf
 
 
 def test_the_checksum_is_crc_32_mpeg_2() -> None:
@@ -20,7 +24,7 @@ def test_the_checksum_is_crc_32_mpeg_2() -> None:
     assert mpeg2(b"123456789") == 0x0376E6E7
     cmd = LowCmd(mode_machine=5)
     for i, motor in enumerate(cmd.motor_cmd[:29]):
-        motor.mode, motor.q, motor.kp, motor.kd, motor.tau = 1, 0.1 * i, 60.0, 1.0, -float(i)
+        motor.mode, motor.q, motor.kp, motor.kd, motor.tau = 1, 0.1 * i, 60.0, 1.0, float(-i)
     assert checksum(cmd) == 2620383363
     cmd.motor_cmd[28].q += 1e-3
     assert checksum(cmd) != 2620383363
@@ -94,10 +98,15 @@ def test_a_robot_that_leans_is_damped() -> None:
     assert cmd.motor_cmd[29].mode == 0
 
 
-def test_the_network_needs_unitree_s_package() -> None:
+def test_the_network_needs_unitree_s_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "unitree_sdk2py", None)
     robot = LowCmdRobot("unitree_g1")
     with pytest.raises(ConfigError, match="needs Unitree's package") as error:
         robot.serve("lo", 0.0)
     assert INSTALL in str(error.value)
-    with pytest.raises(ConfigError, match="must be|simulated every"):
-        LowCmdBridge("momentum-qp", "humanoid", realism="lab")
+
+
+def test_a_robot_that_is_not_simulated_at_500_hz_is_refused(tmp_path: Path) -> None:
+    slow = write_urdf(tmp_path, armature={"*": 0.01}, options={"timestep": 0.004})
+    with pytest.raises(ConfigError, match="simulated every 4 ms with 10 motors.*every 2 ms"):
+        LowCmdBridge("momentum-qp", slow, realism="lab")
