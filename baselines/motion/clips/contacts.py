@@ -94,11 +94,14 @@ def grounded(planted: np.ndarray, dt: float) -> np.ndarray:
     """(F, 2) planted feet without flights, where none of these lasts 0.1 s, as in many dances.
 
     The feet that lifted off last stay down until the next one lands; at the begin those that land.
+    Of more flights than half of the steps nothing is taken: that is a run.
     """
-    if not 0.0 < longest_flight(planted, dt)[1] < HOP:
+    flights = runs_of(np.asarray(~planted.any(axis=1))).tolist()
+    steps = int(np.sum(np.diff(planted.astype(int), axis=0) > 0))
+    if longest_flight(planted, dt)[1] >= HOP or len(flights) > 0.5 * steps:
         return planted
     down = planted.copy()
-    for first, after in runs_of(np.asarray(~planted.any(axis=1))).tolist():
+    for first, after in flights:
         down[first:after] = down[first - 1] if first else down[min(after, len(down) - 1)]
     return down
 

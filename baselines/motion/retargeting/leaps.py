@@ -11,12 +11,12 @@ from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import HOP, measure_contacts
+from poise.baselines.motion.clips.contacts import grounded, measure_contacts
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
-from .paces import calm_joints, hump
+from .paces import FLIGHT, calm_joints, hump
 from .tracks import Tracks
 
 FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
@@ -43,15 +43,15 @@ class Leap(NamedTuple):
 
 
 def find_leaps(clip: Clip) -> list[Leap]:
-    """The jumps with both feet of a clip, in order: flights of 0.1 s or more.
+    """The jumps with both feet of a clip, in order; none for one that walks or stands.
 
     Raises ConfigError for one that runs: one foot swings before the flight.
     """
-    planted = measure_contacts(clip).planted
+    planted = grounded(measure_contacts(clip).planted, clip.dt)
     found = []
     for a, last in stances_of(np.asarray(~planted.any(axis=1))):
         b = last + 1
-        if (b - a) * clip.dt < HOP:
+        if (b - a) * clip.dt <= FLIGHT:
             continue
         around = round(TOGETHER / clip.dt)
         before, after = planted[max(a - around, 0) : a], planted[b : b + around]

@@ -25,6 +25,7 @@ from .tracks import Tracks
 BOTH = 0.1  # [s] on both feet between two steps, at least
 EARLY = 0.2  # [s] by which a sole lifts off before the toes of the clip do, whose heel is up then
 SWING = 0.4  # [s] of a step whose begin or end the clip does not show
+FLIGHT = 0.07  # [s] with both feet off the ground: longer is a run or a jump
 LOWEST, HIGHEST = 0.05, 0.15  # [h] of the way of a foot over the ground at its highest
 DIP, MOST_DIP = 0.5, 0.35  # of its height that a foot's toes dip in swing; the turn [rad]
 LEANING = 1.0  # [Hz] of the low-pass on what the trunk leans: faster, the ZMP cannot be borne
@@ -59,11 +60,11 @@ def find_paces(clip: Clip) -> list[Pace]:
     are not.
 
     Raises:
-        ConfigError: no foot is planted in the first frame, or none is for 0.1 s; no step.
+        ConfigError: no foot is planted in the first frame, or none is for 0.07 s; no step.
     """
     planted = grounded(measure_contacts(clip).planted, clip.dt)
     first, time = longest_flight(planted, clip.dt)
-    if time > 0.0 or not planted[0].any():
+    if time > FLIGHT or not planted[0].any():
         raise ConfigError(
             f"both feet are off the ground for {time:.2f} s at {first * clip.dt:.2f} s: no "
             "controller flies", source=clip.name, field="feet",

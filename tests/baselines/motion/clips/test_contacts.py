@@ -73,3 +73,6 @@ def test_short_flights_are_taken_down_where_there_are_no_long_ones() -> None:
     assert (grounded(planted, 0.05) == planted).all()
     first = grounded(planted[3:], 0.03)  # begins in flight: the foot that lands is down
     assert first[:, 1].tolist() == [True] * 5 + [False] * 2
+    run = np.tile(planted[:8], (3, 1))
+    run[7::8] = False  # a flight at every step
+    assert (grounded(run, 0.02) == run).all()
