@@ -20,7 +20,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays, borne_weight
 
-SMOOTHING = 0.2  # [1/ω] τ of the estimate, unless a controller has its own
+SMOOTHING = 0.7  # [1/ω] τ of the estimate, unless a controller has its own
 MEMORY = 20.0  # [1/ω] T of its mean, unless a controller has its own
 SUPPORTED = 0.1  # [m g] of the ground's force, below which there is no CoP to go by
 

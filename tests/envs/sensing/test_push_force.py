@@ -61,8 +61,8 @@ def test_a_force_is_found_while_trunk_and_arms_turn(direction):
     angle = np.radians(direction)
     way = np.array([np.cos(angle), np.sin(angle)])
     during = found[round(0.6 / PERIOD) : round(0.78 / PERIOD)]
-    np.testing.assert_allclose(during @ way, force * lever(), rtol=0.12)
-    np.testing.assert_allclose(during @ [-way[1], way[0]], 0.0, atol=0.1 * force)
+    np.testing.assert_allclose(during @ way, force * lever(), rtol=0.06)
+    np.testing.assert_allclose(during @ [-way[1], way[0]], 0.0, atol=0.05 * force)
 
 
 def test_the_mean_keeps_the_impulse_of_a_short_push():
