@@ -56,6 +56,8 @@ class Gait(Block):
     speed_margin: float  # [m/s]
     time_min: float  # of a step, whatever the command says [s]
     lower: float  # from when a swinging foot comes down [of the swing]; 0: once it is up
+    catch: float  # the miss of ξ from which the walk is given up [m]; 0: never
+    calm_time: float  # on both feet, after which it goes on [s]
     command: Annotated[np.ndarray, ENTRIES]  # see `GaitCommand.array`
     velocity: Annotated[np.ndarray, 3]  # ahead, left, turn, which follow the command
     error: Annotated[np.ndarray, 2]  # what the sum of the velocity's errors adds to it [m/s]
@@ -65,6 +67,8 @@ class Gait(Block):
     starting: Integer  # 1 until the first foot lifts off
     clock: Number  # since both feet are down [s]
     cop: Annotated[np.ndarray, 2]  # that was asked for last on one foot [m]
+    miss: Number  # of ξ at touchdown, which that CoP leaves [m]
+    caught: Integer  # 1 from when the walk was given up until it goes on
     middle: Annotated[np.ndarray, 2]  # between the soles at the last touchdown [m]
     step_clock: Number  # since then [s]; < 0: there was none
     treads: Treads
