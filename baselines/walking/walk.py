@@ -44,7 +44,7 @@ def allocate_gait(
     numbers = in_si(
         config, units, "step_time", "transfer_time", "width", "height", "acceleration",
         "turn_acceleration", "correction", "correction_limit", "time_price", "transfer_gain",
-        "start_radius", "start_time", "speed_margin", "lower",
+        "start_radius", "start_time", "speed_margin", "lower", "catch", "calm_time",
     )  # fmt: skip
     if limits is None:
         numbers["speed_margin"] = np.inf
