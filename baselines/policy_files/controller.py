@@ -120,7 +120,7 @@ class PolicyFile(CompiledController):
             self.joints.stiffness.copy(), self.joints.damping.copy(), limit,
             self.joints.target.copy(), guarded_zeros(nj), 0, every,
         )  # fmt: skip
-        self._failures, self._no_wrench = guarded_zeros(1, dtype=np.int64), guarded_zeros(6)
+        self._no_wrench = guarded_zeros(6)
         self._callback = Callback(self._ask)
         self._state: RobotState | None = None
         self._tick: PolicyTick | None = None
@@ -255,7 +255,7 @@ class PolicyFile(CompiledController):
     def outputs(self) -> Outputs:
         s = self._servos
         servos = {"target": s.target, "stiffness": s.stiffness, "damping": s.damping}
-        return Outputs(s.tau, self._no_wrench, self._failures, False, **servos)
+        return Outputs(s.tau, self._no_wrench, 0, False, **servos)
 
     def gains(self) -> PolicyServos:
         """See `CompiledController`; raises what went wrong in the step before."""

@@ -72,15 +72,16 @@ class BoundQP(Copyable):
         self.contacts = bind_parts(config.contacts, robot, "contacts")
         self.limits = bind_parts(config.limits, robot, "limits")
         posture = self.tasks.get("posture")
-        own = posture is not None and isinstance(posture.block, PostureBlock)
         #: the gains of the task `posture`; zero without one
-        self.posture: PostureBlock = posture.block if own else no_posture(robot.model.nv)
+        self.posture: PostureBlock = no_posture(robot.model.nv)
+        if posture is not None and isinstance(posture.block, PostureBlock):
+            self.posture = posture.block
         self.memory = allocate_memory(self.parameters.torque_limit)
 
     @property
     def failures(self) -> int:
         """The ticks since the reset at which the QP was not solved."""
-        return int(self.memory.failures[0])
+        return self.memory.failures
 
     def new_workspace(self, arrays: RobotArrays, p: QPParameters) -> Workspace:
         """Zeroed scratch for the soles of `arrays`."""
@@ -195,7 +196,9 @@ class MomentumQP(BoundQP, CompiledController):
 
     def outputs(self) -> Outputs:
         ws, p = self.workspace, self.parameters
-        return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root, ws.vdot)
+        return Outputs(
+            ws.tau, ws.root_wrench, self.memory.memory_of("failures"), p.soft_root, ws.vdot
+        )
 
     def compensation(self, state: RobotState, targets: Targets) -> Compensation:
         """The block that `compensate` moves these targets by, see `ForceCompensation`."""
@@ -261,7 +264,7 @@ class MomentumQP(BoundQP, CompiledController):
                 solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.solved:
                 ws.x[:] = solution.x
-            ws.status[0] = 0 if solution.solved else 1
+            ws.status = 0 if solution.solved else 1
             accept(state.arrays, self.parameters, ws, self.memory)
         return ws.tau[self._motor_joints].copy()
 

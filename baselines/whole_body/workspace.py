@@ -8,14 +8,15 @@ import numpy as np
 
 from poise.baselines.solvers.dual_active_set import iscratch_size, scratch_size
 from poise.baselines.solvers.null_space import NullSpace, allocate_null_space
-from poise.envs.compiled.block import Block, Integer
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays, sole_chains
 
 from .tasks.task import TaskSpace
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Workspace(Block):
     """Scratch of the reduced problem; `H`, `g`, `C`, `l`, `u` are the QP after `assemble`.
 
@@ -71,7 +72,7 @@ class Workspace(Block):
     lam: Annotated[np.ndarray, "m"]
     scratch: Annotated[np.ndarray, "floats"]
     iscratch: Annotated[np.ndarray, "ints", np.int64]
-    status: Integer  # how the solution ended, see `solvers/scaled_rows.py`; 0: solved
+    status: Mutable[int]  # how the solution ended, see `solvers/scaled_rows.py`; 0: solved
     vdot: np.ndarray  # (nv,) solution, a view of `values` like the next two
     wrenches: np.ndarray  # (k,) solution
     tau_asked: np.ndarray  # (nj,) solution, to rounding within the limits

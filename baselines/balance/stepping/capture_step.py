@@ -108,7 +108,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         #: (nv−6,) of the last tick [N·m]
         self.tau = guarded_zeros(len(self.qp.parameters.torque_limit))
         self._vdot = guarded_zeros(robot.model.nv)
-        self._failures = guarded_zeros(1, dtype=np.int64)
+        self._failures: Any = guarded_zeros(1, dtype=np.int64)  # of the tick and of the outputs
         self._motors = self.qp.arrays.motor_dofs - 6
         self._reference_out: Targets | None = None
         self._tick: CaptureTick | None = None

@@ -86,7 +86,7 @@ def shift_loads(t: PerformTick, time: float) -> None:
         if foot >= 0 and not flies(t, phase):
             most = max(UNLOADED * left / p.unload_time, LEAST_LOAD)
             limits[foot] = min(limits[foot], weight * most)
-    c.on_both.limited[0] = 1
+    c.on_both.limited = 1
 
 
 @compiled
@@ -179,16 +179,16 @@ def fly(t: PerformTick, time: float) -> None:
     accel, memory = contacts.problem.workspace.sole_accel, contacts.memory
     for foot in range(2):
         contacts.load_limits[foot] = WEIGHTLESS * c.robot.mass * c.robot.gravity
-    contacts.limited[0] = 1
+    contacts.limited = 1
     perform_targets(t, reached_region(t))
-    share, failures = 1.0, memory.failures[0]
+    share, failures = 1.0, memory.failures
     while True:
         lead_soles(t, time, share)
         solve_contacts(c, contacts)
-        if memory.failures[0] == failures or share < LEAST_SHARE:
+        if memory.failures == failures or share < LEAST_SHARE:
             break
         go_on_from(contacts, memory.torques)
-        memory.failures[0], share = failures, 0.5 * share
+        memory.failures, share = failures, 0.5 * share
     for r in range(accel.shape[0]):
         accel[r] = 0.0
 
@@ -218,7 +218,7 @@ def perform(t: PerformTick, time: float) -> bool:
     if m.swinging:
         follow_foot(t)
         contacts = c.on_second if m.foot == 0 else c.on_first
-        contacts.limited[0] = 0
+        contacts.limited = 0
     else:
         contacts = c.on_both
         shift_loads(t, time)
@@ -241,5 +241,5 @@ def perform_tick(t: PerformTick) -> None:
     if not p.performing or not perform(t, time):
         ask_to_rest(t)
         capture_tick(c)
-    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
-    c.failures[0] = failures + t.own.on_both.memory.failures[0]
+    failures = c.standing.memory.failures + c.on_both.memory.failures
+    c.failures = failures + t.own.on_both.memory.failures

@@ -281,7 +281,7 @@ def test_a_soft_root_is_reported():
 def test_failures_of_the_solver_are_counted_per_episode(env):
     """info says how often the QP was not solved since the reset."""
     env.reset(seed=0)
-    env.controller.memory.failures[0] = 3
+    env.controller.memory.failures = 3
     assert env.step(zero(env))[4]["solver_failures"] >= 3
     assert env.reset(seed=0)[1]["solver_failures"] == 0
 
@@ -378,7 +378,7 @@ def test_failures_and_the_root_wrench_are_reported(solver):
     config = replace(controller_config("momentum-qp"), root="soft", solver=solver)
     env = ResidualBalanceEnv(robot(), controller=config, pushes=None)
     env.reset(seed=0)
-    env.controller.memory.failures[0] = 3
+    env.controller.memory.failures = 3
     info = env.step(zero(env))[-1]
     assert info["solver_failures"] == 3
     assert np.array_equal(info["root_wrench"], env.controller.root_wrench)

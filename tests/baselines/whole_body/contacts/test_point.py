@@ -146,7 +146,7 @@ def test_the_force_that_is_wanted_has_a_limit():
     _, state, targets, _ = after(qp, 0.1)
     weight = state.mass * state.robot.gravity
     assert NORMAL @ qp.forces["hand"] == pytest.approx(0.05 * weight, rel=1e-6)
-    qp.contacts["hand"].block.largest[0] = 0.02 * weight
+    qp.contacts["hand"].block.largest = 0.02 * weight
     qp.torques(state, targets)
     assert NORMAL @ qp.forces["hand"] == pytest.approx(0.02 * weight, rel=1e-6)
 
