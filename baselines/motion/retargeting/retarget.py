@@ -159,7 +159,7 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
     solved: dict[float, Any] = {}
     reason, bound = None, ""
 
-    def made_of(trial: Trial) -> Retargeted:
+    def made_of(trial: RetargetTrial) -> Retargeted:
         """The motion of a trial; raises ConfigError as `perform_plan`."""
         tempo = trial.tempo
         slower = clip if tempo == 1.0 else clip.at_speed(tempo)
@@ -200,7 +200,7 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
     raise reason
 
 
-class Trial(NamedTuple):
+class RetargetTrial(NamedTuple):
     """What is tried of steps: shares of the clip's length and tempo, the height of the CoM, how
     much lower it may be [m], the share of the width, the low-pass on trunk and arms [Hz]."""
 
@@ -216,13 +216,13 @@ class Trial(NamedTuple):
         return self.stride, self.tempo
 
 
-def _trials() -> Iterator[Trial]:
+def _trials() -> Iterator[RetargetTrial]:
     """As the clip has them, the fastest first; then with a CoM that is lower where legs do not
     reach, steps that are less wide, and calmer arms."""
-    yield from (Trial(*way, low) for way in TRIED for low in LOWER)
+    yield from (RetargetTrial(*way, low) for way in TRIED for low in LOWER)
     fast = [way for way in TRIED if way[0] * way[1] >= ENOUGH]
     for spread, calm in GIVING:
-        yield from (Trial(*way, LOWER[-1], SINK, spread, calm) for way in fast)
+        yield from (RetargetTrial(*way, LOWER[-1], SINK, spread, calm) for way in fast)
 
 
 def _leaping(

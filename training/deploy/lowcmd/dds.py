@@ -39,7 +39,7 @@ def control(bridge: LowCmdBridge, interface: str, seconds: float) -> None:
             time.sleep(0.1 * PERIOD)
 
 
-def simulate(robot: LowCmdRobot, interface: str, seconds: float) -> None:
+def simulate_over_dds(robot: LowCmdRobot, interface: str, seconds: float) -> None:
     """As `LowCmdRobot.serve`."""
     sdk = _sdk(interface)
     latest: list[Any] = []

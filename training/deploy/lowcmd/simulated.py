@@ -84,9 +84,9 @@ class LowCmdRobot:
         Until the first LowCmd the robot waits as it stands. Raises ConfigError without the package
         unitree_sdk2py.
         """
-        from .dds import simulate
+        from .dds import simulate_over_dds
 
-        simulate(self, interface, seconds)
+        simulate_over_dds(self, interface, seconds)
 
     @property
     def stands(self) -> bool:
