@@ -79,7 +79,7 @@ class ResidualBalanceEnv(ControlledEnv):
     Observation: <observation>
 
     The push is not observed. `observation: {extra: [push_force, push_mean]}` adds the force that
-    is estimated from CoM and CoP, and its leaky mean. The reference is that of `motion`.
+    is estimated from momentum and CoP, and its leaky mean. The reference is that of `motion`.
 
     A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the
     option "command" of `reset` sets it from the start on: a mapping with `ahead`, `left` [m/s] and
@@ -218,7 +218,7 @@ class ResidualBalanceEnv(ControlledEnv):
         `info["stand_in"]` names it.
         """
         config = getattr(self._known, "config", None)
-        if is_replaced(config, level):
+        if config is not None and is_replaced(config, level):
             return str(config.uncertain)
         return None
 

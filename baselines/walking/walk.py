@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -43,12 +44,14 @@ def allocate_gait(
     numbers = in_si(
         config, units, "step_time", "transfer_time", "width", "height", "acceleration",
         "turn_acceleration", "correction", "correction_limit", "time_price", "transfer_gain",
-        "start_radius", "start_time", "speed_margin", "lower",
+        "start_radius", "start_time", "speed_margin", "lower", "catch", "calm_time",
     )  # fmt: skip
     if limits is None:
         numbers["speed_margin"] = np.inf
     command = guarded_zeros(ENTRIES)
-    parts = {f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)}
+    parts: dict[str, Any] = {
+        f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)
+    }
     return Gait.allocate(
         **numbers,
         command=command,

@@ -9,7 +9,7 @@ be. With c moved by −F z/W the CoP stays in the middle [Stephens07]. So c_ref 
 
     Δ = −(h/W) k F̂ − λ d F̄/|F̄| min(|F̄|/F₀, 1) |F̄|/S
 
-F̂ is the force that `push_force.py` estimates from c, ċ and p alone, F̄ its mean over the last
+F̂ is the force that `push_force.py` estimates from momentum and CoP, F̄ its mean over the last
 seconds and S that of |F̂|. The first part answers a push that lasts. The second one is for pushes
 that come again from one side: it stays between them, and is zero for pushes from all sides, whose
 |F̄|/S is. λ ∈ [0, 1] falls while the capture point is away from where it is to be, so that the
@@ -56,7 +56,7 @@ def _number(default: float, **bounds: float):
 class ForceCompensation:
     """Gains of `compensation.py`, without units: lengths in h, times in 1/ω, forces in m g."""
 
-    gain: float = _number(0.7, min=0.0, max=3.0)  # k of F̂
+    gain: float = _number(1.0, min=0.0, max=3.0)  # k of F̂
     smoothing: float = _number(SMOOTHING, min=0.0)  # τ of F̂ [1/ω]
     reach: float = _number(0.07, min=0.0, max=0.5)  # d, for pushes from one side [h]
     memory: float = _number(MEMORY, above=0.0)  # T of F̄ [1/ω]

@@ -72,9 +72,10 @@ class BoundQP(Copyable):
         self.contacts = bind_parts(config.contacts, robot, "contacts")
         self.limits = bind_parts(config.limits, robot, "limits")
         posture = self.tasks.get("posture")
-        own = posture is not None and isinstance(posture.block, PostureBlock)
         #: the gains of the task `posture`; zero without one
-        self.posture: PostureBlock = posture.block if own else no_posture(robot.model.nv)
+        self.posture: PostureBlock = no_posture(robot.model.nv)
+        if posture is not None and isinstance(posture.block, PostureBlock):
+            self.posture = posture.block
         self.memory = allocate_memory(self.parameters.torque_limit)
 
     @property

@@ -162,7 +162,7 @@ class Block:
         return type(self)(*self.members())
 
 
-def named_entries(kind: type[Block]) -> tuple[np.ndarray, ...]:
+def named_entries(kind: type[Block]) -> tuple[Any, ...]:
     """Members of a block whose first one is an array of zeros, and all others are its entries.
 
     Code that needs a vector takes the array, and code that needs one entry its name.
@@ -182,7 +182,7 @@ def _length(part: int | str, sizes: Mapping[str, int]) -> int:
     return int(found[1] or 1) * sizes[found[2]] + int(found[3] or 0)
 
 
-def _words(value: Any) -> tuple[types.Type, list[int]]:
+def _words(value: Any) -> tuple[Any, list[int]]:
     """Numba's type of a field, and its 64-bit words."""
     if isinstance(value, Block):
         return value.numba_type, [value.address]

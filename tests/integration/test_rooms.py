@@ -50,7 +50,8 @@ FLOORS = """
 17 training/benchmarking/trials, training/learning/seeds, training/motion
 18 training/benchmarking/suites, training/deploy/robot_check/standing, training/deploy/standalone
 18 training/learning/tuning, training/motion/following, training/pictures/figures
-19 training/benchmarking/metrics, training/deploy/qp_set, training/deploy/robot_check
+19 training/benchmarking/metrics, training/deploy/lowcmd, training/deploy/qp_set
+19 training/deploy/robot_check
 20 training/benchmarking/evaluation
 21 training/benchmarking/results, training/motion/gaits
 22 training/deploy/export, training/pictures/report, training/pictures/sessions

@@ -26,7 +26,7 @@ class Machine(TypedDict):
 class Circumstances(TypedDict):
     """The origin of a result; `seconds` is of the last call only."""
 
-    command_line: str
+    command: str
     versions: dict[str, str]
     machine: Machine
     workers: int

@@ -13,7 +13,7 @@ from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import foot_signs, nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts
+from poise.baselines.motion.clips.contacts import grounded, longest_flight, measure_contacts
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
@@ -62,7 +62,7 @@ def find_paces(clip: Clip) -> list[ClipStep]:
     Raises:
         ConfigError: no foot is planted in the first frame, or none is for 0.07 s; no step.
     """
-    planted = measure_contacts(clip).planted
+    planted = grounded(measure_contacts(clip).planted, clip.dt)
     first, time = longest_flight(planted, clip.dt)
     if time > FLIGHT or not planted[0].any():
         raise ConfigError(
@@ -107,7 +107,7 @@ def _in_turn(found: list[ClipStep]) -> list[ClipStep]:
 
 def plan_paces(
     paces: list[ClipStep], tracks: Tracks, qpos: np.ndarray, robot: Robot, lead: int, scale: float,
-    low: float,
+    low: float, swinging: float = SWINGING,
 ) -> FootPlan:  # fmt: skip
     """The plan of a clip's steps for a robot.
 
@@ -119,6 +119,7 @@ def plan_paces(
         lead: frames from standing into the clip, and back.
         scale: of the robot's legs over the clip's.
         low: height of the CoM from first to last step, over that of standing.
+        swinging: low-pass on trunk and arms [Hz].
     """
     begin = frames_before(paces, lead)
     frames = max(begin + len(qpos) + lead, begin + round((paces[-1].land + AFTER) / RATE))
@@ -146,7 +147,7 @@ def plan_paces(
     lean[:, :2] = low_pass(lean[:, :2], LEANING)
     root = led(lean, np.zeros(3), np.array([0.0, 0.0, yaws[-1].mean()]),
                 lead, begin, frames)  # fmt: skip
-    joints = calm_joints(robot, qpos, lead, begin, frames)
+    joints = calm_joints(robot, qpos, lead, begin, frames, swinging)
     return FootPlan(RATE, joints, root, _heights(frames, times, h, low), places,
                     turns.reshape(frames, 2, 3), planted)  # fmt: skip
 
@@ -190,11 +191,13 @@ def led(
                            np.repeat(last[None], after, axis=0)])  # fmt: skip
 
 
-def calm_joints(robot: Robot, qpos: np.ndarray, lead: int, begin: int, frames: int) -> np.ndarray:
+def calm_joints(
+    robot: Robot, qpos: np.ndarray, lead: int, begin: int, frames: int, cutoff: float = SWINGING
+) -> np.ndarray:
     """Return joints (F, nj) of a clip's postures, low-pass filtered and within their limits,
     blended from and to standing."""
     standing, (least, most) = robot.standing_qpos[7:], (robot.joint_range + [MARGIN, -MARGIN]).T
-    calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
+    calm = np.clip(low_pass(qpos[:, 7:], cutoff), least, most)
     return led(calm, standing, standing, lead, begin, frames)
 
 

@@ -10,6 +10,7 @@ from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.errors import ConfigError
+from poise.envs.physics.pushes.push import Kick
 from poise.envs.sensing.realism import load_realism
 from tests.support.refused import refused
 from tests.support.shared import robot
@@ -155,7 +156,18 @@ def test_the_error_of_a_stride_is_that_of_the_walk(env):
     off, spin = np.hypot(*found[:2]) / (0.1 * s.velocity), found[2] / (0.05 * s.omega)
     weight = env.config.reward.tracking
     assert terms["tracking"] == pytest.approx(weight * np.exp(-(off**2) - spin**2))
-    assert env.recovered == (np.hypot(*found[:2]) < 0.036 * s.omega * s.height)
+
+
+def test_success_is_not_to_fall(env):
+    """A walk that lags its command has not failed; one that falls has."""
+    env.reset(seed=1)
+    play(env, 2.5)
+    env._strides.error[0] = 0.5
+    assert not env.fallen and env.info()["is_success"] is True
+    env.reset(seed=1, options={"push": Kick(0.5, 4.0, 90.0)})
+    while env.episode.running:
+        env.step_without_info(np.zeros(env.action_space.shape))
+    assert env.fallen and env.info()["is_success"] is False
 
 
 @pytest.mark.parametrize(

@@ -196,6 +196,6 @@ def impulse_of_the_root(config, direction):
 def test_a_soft_root_takes_less_from_nowhere(direction):
     """moskalev24 takes 70 to 85 N·s of the 210 of this push, and at most 30 if it leans."""
     soft = controller_config("moskalev24")
-    leaning = replace(soft, compensation=ForceCompensation())
+    leaning = controller_config("moskalev24-compensated")
     assert impulse_of_the_root(soft, direction) > 60.0
     assert impulse_of_the_root(leaning, direction) < 30.0

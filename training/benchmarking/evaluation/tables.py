@@ -163,7 +163,7 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
 def stand_in_notes(summary: Summary) -> list[str]:
     """Return a line for each controller that another one has replaced in some trials."""
     return [
-        f"{name}: {other} ran in its place in {count} of {entry['played']} trials, as the "
+        f"{name}: {other} ran in its place in {count} of {entry['evaluated']} trials, as the "
         f"controller's `uncertain` says for this realism"
         for name, entry in summary["controllers"].items()
         for other, count in entry.get("stand_ins", {}).items()

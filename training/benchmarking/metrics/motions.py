@@ -20,6 +20,7 @@ from poise.training.running.trial_figures import InMotion, MotionLevel, MotionMe
 
 from .evaluated import Evaluated, cells, fitted, pushes, trials_of_parts, won
 
+PERFORMS = "a suite that performs motions"
 MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level has the mean of
 
 
@@ -33,14 +34,9 @@ def suite_repertoire(suite: Suite, robot: Robot, folder: Path, overwrite: bool) 
     if suite.motions is None:
         return Repertoire({}, {}, {})
     names, labels = suite.motions.names, suite.motions.labels
-    load = _of_motions().load_repertoire
+    load = load_extra("motions", "repertoire", PERFORMS)
     repertoire: Repertoire = load(names, labels, robot, folder, overwrite)
     return repertoire
-
-
-def _of_motions() -> Any:
-    """Return the module `training/motion/following/repertoire.py`; raises MissingExtra."""
-    return load_extra("motions", "repertoire", "a suite that performs motions")
 
 
 def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> TrialStage:
@@ -49,7 +45,7 @@ def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> TrialStage:
     if chosen is None:
         again = suite.get_up_time or (None if suite.get_up is None else 0.0)
         return TrialStage(robot, suite.duration, suite.noise, get_up=again, physics=suite.physics)
-    is_clip = _of_motions().is_clip
+    is_clip = load_extra("motions", "is_clip", PERFORMS)
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
     motions = ((STANDING, STANDING), *files)

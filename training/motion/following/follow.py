@@ -29,6 +29,8 @@ from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.motion.tracking.record import TrackingFigures
 
+from .footsteps import Steps
+
 PUSH_TIME = 0.1  # [s]
 LITTLE = 0.2  # [m, rad]
 LEAN = 30.0  # [deg] beyond the motion's own largest tilt
@@ -46,6 +48,11 @@ class Followed(TrackingFigures):
     #: that is less than 0.2 m
     walked: float = np.nan
     turned: float = np.nan  #: the same of the turn; NaN if less than 0.2 rad is commanded
+    #: from here on as of `Footsteps`; NaN of a motion without steps
+    footsteps: float = np.nan
+    footsteps_kept: float = np.nan
+    footstep_delay: float = np.nan
+    footstep_place: float = np.nan
 
 
 def follow(
@@ -111,10 +118,15 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        course = FollowedWalk(reference.commands, None if watch is None else watch(trial))
+        steps = Steps(reference, None if watch is None else watch(trial))
+        course = FollowedWalk(reference.commands, steps)
         followed = _followed(run_trial(agent, trial, course), trial)
         walked, turned = course.shares()
-        trials.append(replace(followed, walked=walked, turned=turned))
+        number, kept, delay, place = steps.figures()
+        trials.append(replace(
+            followed, walked=walked, turned=turned, footsteps=number, footsteps_kept=kept,
+            footstep_delay=delay, footstep_place=place,
+        ))  # fmt: skip
         if trials[-1].fallen and not patient:
             break
     return trials

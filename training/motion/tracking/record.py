@@ -25,7 +25,7 @@ LANDING = 25  # policy steps after which feet of a disturbed start have landed
 class TrackingFigures(StepFigures):
     """How near a trial stayed to the motion; NaN where it fell at once."""
 
-    joint_rms: float  #: root mean square of joint errors [rad]
+    joint_rms: float  #: root mean square of joint errors [rad], of a walk of trunk and arms alone
     #: mean distance of the bodies from where the motion has them, on the soles as they stand [m]
     #: (MPKPE)
     body_error: float
@@ -155,7 +155,7 @@ def tracking_errors(
     root = int(np.searchsorted(reference.bodies, reference.robot.root_body_id))
     gap = sim.data.xpos[reference.bodies] - places
     return (
-        float(np.mean((sim.data.qpos[7:] - joints) ** 2)),
+        float(np.mean((sim.data.qpos[7:] - joints)[reference.led] ** 2)),
         float(np.linalg.norm(gap, axis=1).mean()),
         float(np.linalg.norm(gap - gap[root], axis=1).mean()),
         float(np.linalg.norm(sim.state.com - reference.com)),

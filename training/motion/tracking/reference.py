@@ -47,6 +47,7 @@ class ReferenceBodies:
 
     Attributes:
         bodies: (n,) bodies that are compared: the robot's own, which move.
+        led: joints that follow the motion: all, but of a walk by commands those of trunk and arms.
         com: (3,) where the CoM is to be, at the last time that was asked for [m].
         origin, turn: (3,), (3, 3) of the motion's frame then: that of the soles as they stand, or
             the one that a motion with steps has of its own.
@@ -60,6 +61,8 @@ class ReferenceBodies:
         moving[0] = False
         self.bodies = np.flatnonzero(moving)
         self._legs = _leg_dofs(robot)
+        own = np.setdiff1d(np.arange(model.nv - 6), self._legs - 6)
+        self.led: slice | np.ndarray = slice(None) if motion.commands is None else own
         self._correction = np.zeros(len(self._legs))  # where the last search ended
         self.com, self.origin, self.turn = np.zeros(3), np.zeros(3), np.eye(3)
 

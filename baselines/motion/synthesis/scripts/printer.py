@@ -55,7 +55,7 @@ def body_text(body: ClipName | StateName | Sequence) -> str:
         return f"({sequence_text(body)})"
     if isinstance(body, StateName):
         name = body.name if body.name.isidentifier() else body_text(ClipName(body.name, True))
-        return f"<{name}>" if body.time is None else f"<{name} @ {number_text(body.time)}>"
+        return f"<{name}>" if body.time is None else f"<{name} @ {shortest_number(body.time)}>"
     if '"' in body.name or "\n" in body.name:
         raise ConfigError(f"cannot be quoted: {shown(body.name)}", field="clip")
     return f'"{body.name}"' if body.quoted else body.name

@@ -109,7 +109,7 @@ def test_some_commands_need_a_momentum_qp():
     """Others are refused by name, with those that will do."""
     assert momentum_qp_config("moskalev24").root == "soft"
     own = ", ".join(f"momentum-qp{of}" for of in ("", "-compensated", "-g1", "-h1", "-osqp", "-t1"))
-    choices = f"abe07, {own}, moskalev24, root-assist"
+    choices = f"abe07, {own}, moskalev24, moskalev24-compensated, root-assist"
     with pytest.raises(ConfigError, match=f"lip-mpc.*choices: {choices}"):
         momentum_qp_config("lip-mpc")
 

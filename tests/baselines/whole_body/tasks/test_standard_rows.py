@@ -89,7 +89,9 @@ def test_desired_momentum_rates(tick):
         (rate + [0.0, 0.0, state.mass * 9.81], angular.b + state.Adot_v[3:]),
         ([0.0, 0.0, state.mass * 9.81], desired_moment(given, cop.block)),  # no CoM task before
     ):
-        moment = wrench_about(state.com, [(p_des, force)])[3:] - 3.0 * state.angular_momentum
+        moment = (
+            wrench_about(state.com, [(p_des, np.array(force))])[3:] - 3.0 * state.angular_momentum
+        )
         np.testing.assert_allclose(found, moment, atol=1e-9)
 
 

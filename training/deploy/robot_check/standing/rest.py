@@ -36,7 +36,7 @@ class Rest:
     chatter: float = 0.0
     foot_drift: float = 0.0
     com_drift: float = 0.0
-    tilt_of: float = 0.0
+    lean: float = 0.0
     unsolved: int = 0
     ticks: int = 0
     refused: str = ""
