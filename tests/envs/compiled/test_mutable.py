@@ -88,12 +88,12 @@ def test_a_shallow_copy_shares_numbers_as_it_shares_arrays(duplicate) -> None:
     assert numbers(other) == (1.75, 7, False) and block.values[0] == 9.0
 
 
-@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda b: pickle.loads(pickle.dumps(b))])
 def test_a_replacement_that_would_share_nothing_is_refused() -> None:
     with pytest.raises(TypeError, match="use .replace"):
         replace(timer(), dt=1.0)
 
 
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda b: pickle.loads(pickle.dumps(b))])
 def test_blocks_that_share_a_number_share_it_in_their_copies(duplicate) -> None:
     first = timer()
     second = Timer(np.zeros(2), 0.0, first.memory_of("steps"), False, 1.0)
