@@ -80,4 +80,4 @@ else:
 
         message = f"poise.baselines.{name} is poise.baselines.motion.{name}"
         warnings.warn(message, DeprecationWarning, stacklevel=2)
-        return getattr(load_extra("moved", "motion", f"poise.baselines.{name}"), name)
+        return load_extra("moved", "motion", f"poise.baselines.{name}")(name)

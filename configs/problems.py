@@ -75,7 +75,7 @@ def out_of_range(
     `form` is the format of the value; without one it is as in Python.
     """
     bounds = {"least": least, "above": above, "most": most}
-    facts = {name: bound for name, bound in bounds.items() if bound is not None}
+    facts: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound is not None}
     words = {"least": "at least", "above": "above", "most": "at most"}
     limits = " and ".join(f"{words[name]} {bound}" for name, bound in facts.items())
     if least is not None and most is not None:

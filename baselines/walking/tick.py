@@ -125,7 +125,7 @@ def limit_loads(t: WalkTick, fraction: float) -> None:
     weight, new = borne_weight(c.robot, c.state), c.memory.foot
     c.on_both.load_limits[new] = weight * (FIRST_LOAD + LOADED * fraction)
     c.on_both.load_limits[1 - new] = weight * max(UNLOADED * (1.0 - fraction), LEAST_LOAD)
-    c.on_both.limited[0] = 1
+    c.on_both.limited = 1
 
 
 @compiled
@@ -136,7 +136,7 @@ def transfer_tick(t: WalkTick) -> bool:
     m.corners = double_support_region(
         t.walk.search.region, feet, level[0, 0], level[1, 0], c.cloud, m.region
     )
-    c.on_both.limited[0] = 0
+    c.on_both.limited = 0
     ready = shift_cop(t, c.vector) if g.starting else transfer_cop(t, c.vector)
     g.clock += c.gains.period
     if not g.starting:
@@ -222,8 +222,8 @@ def stop_walking(t: WalkTick) -> None:
 def count_failures(t: WalkTick) -> None:
     """Count the ticks that no QP could solve."""
     c = t.capture
-    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
-    c.failures[0] = failures + t.walk.on_both.memory.failures[0]
+    failures = c.standing.memory.failures + c.on_both.memory.failures
+    c.failures = failures + t.walk.on_both.memory.failures
 
 
 @compiled

@@ -50,10 +50,10 @@ def demo(
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()
-    from .demo import demo
+    from .demo import run_demo
 
     folder = out or Path("out/demo-full" if full else "out/demo")
-    demo(folder, full=full, workers=workers, seed=seed, overwrite=overwrite, console=terminal())
+    run_demo(folder, full=full, workers=workers, seed=seed, overwrite=overwrite, console=terminal())
 
 
 def train() -> None:
@@ -330,23 +330,23 @@ def robot(
         check_out_file(picture, "picture")
         choose_gl_backend()
     from poise.training.deploy.robot_check.check import check_robot
-    from poise.training.deploy.robot_check.tables import print_check
+    from poise.training.deploy.robot_check.tables import print_robot_check
     from poise.training.deploy.robot_check.written import load_and_write
 
     loaded, written = load_and_write(name)
     if written is not None:
         print(f"{written}: a guessed description, to correct and to name from now on")
     check = check_robot(loaded)
-    print_check(check, terminal(stderr=json))
+    print_robot_check(check, terminal(stderr=json))
     if json:
         print_json(check.to_json())
     if out is not None:
         write_atomic(out, dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
         terminal(stderr=json).print(str(out), soft_wrap=True)
     if picture is not None:
-        from poise.training.deploy.robot_check.picture import draw_robot
+        from poise.training.deploy.robot_check.picture import write_picture
 
-        draw_robot(loaded, picture)
+        write_picture(loaded, picture)
         print(picture)
 
 
@@ -363,15 +363,15 @@ def policies() -> None:
 def list_names(*, json: Json = False) -> None:
     """List what can be named: robots, controllers, policies with their J50, suites and the like."""
     from poise.baselines.extras import load_extra, missing_extra, registered
-    from poise.training.running.options.names import named, suites_of_j50
+    from poise.training.running.options.names import names_by_kind, suites_of_j50
     from poise.training.running.options.pages import print_names
 
     further = {kind: missing_extra("names", kind) for kind in registered("names")}
     more = {kind: load_extra("names", kind)() for kind, extra in further.items() if extra is None}
     if json:
-        print_json({**named(), **more})
+        print_json({**names_by_kind(), **more})
         return
-    print_names(named(), suites_of_j50(), terminal())
+    print_names(names_by_kind(), suites_of_j50(), terminal())
     for kind, names in more.items():
         print(f"{kind}: {', '.join(names)}")
     for kind, extra in further.items():

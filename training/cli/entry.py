@@ -29,7 +29,7 @@ from poise.training.running.stopping import (
 from poise.training.running.terminal import speak_plainly, terminal
 
 from .commands import COMMANDS
-from .policies import run as run_policies
+from .policies import run_policies
 
 SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
 HELP = ("-h", "--help", "--help-all")
@@ -134,9 +134,9 @@ def _run(args: list[str]) -> int:
         raise Problem("unknown command", None, None, COMMANDS, value=shown(name), hint=hint)
     if name == "train":  # its flags are the fields of a heavy dataclass
         check_flags(given, {"--config": "training", "--robot": "robots"})
-        from .train import run
+        from .train import run_train
 
-        run(given)
+        run_train(given)
         return 0
     if name == "motion":  # it has sub-commands
         return int(load_extra("commands", name)(given))

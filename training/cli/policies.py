@@ -42,15 +42,15 @@ def check(
     from poise.baselines.allowance import allowing
     from poise.envs.robots.robot import load_robot
     from poise.training.deploy.policy_check.check import check_policy
-    from poise.training.deploy.policy_check.tables import print_check
+    from poise.training.deploy.policy_check.tables import print_policy_check
 
     with allowing(allow):
         found = check_policy(file, load_robot(robot), rollout)
-    print_check(found, terminal())
+    print_policy_check(found, terminal())
     return 0 if found.right else 1
 
 
-def run(args: Sequence[str]) -> int:
+def run_policies(args: Sequence[str]) -> int:
     """Run `poise policies`: the list, or the sub-command `check`."""
     if args and args[0] == "check":
         return answered(check, args[1:], "poise policies check")

@@ -89,12 +89,12 @@ class Command:
     allow: Allow = ()
 
 
-def run(args: Sequence[str]) -> None:
+def run_train(args: Sequence[str]) -> None:
     """Parse and train, or print the help; raises ConfigError."""
     if {"-h", "--help", "--help-all"} & set(args):
         print_help(train_config(_base(args)), everything="--help-all" in args)
         return
-    command = parse(args)
+    command = parse_train(args)
     out, allow = command.out, [*named(_peek(args).controller), *command.allow]
     if not command.seeds and not exists(out / SEEDS):
         note = steps_note(command.settings, out, command.resume)
@@ -197,7 +197,7 @@ def print_help(config: TrainConfig, everything: bool) -> None:
         print_options(title or "more of the run", group, console)
 
 
-def parse(args: Sequence[str]) -> Command:
+def parse_train(args: Sequence[str]) -> Command:
     """Return the command of these arguments, its configuration checked like one from a file."""
     base, quick = train_config(_base(args)), _peek(args).quick
     with one_line_errors("poise train", options(base), args):

@@ -71,12 +71,12 @@ def walk(
     from poise.training.benchmarking.trials.names import check_names
 
     check_names([controller], robot=robot, realism=realism, physics=physics)
-    from poise.training.pictures.sessions.walk import walk
+    from poise.training.pictures.sessions.walk import play_walk
 
     command = {"ahead": speed, "left": left, "turn": math.radians(turn), "step_time": step_time,
                "step_length": step_length, "width": width, "clearance": clearance,
                "arm_swing": arm_swing}  # fmt: skip
-    outcome = walk(
+    outcome = play_walk(
         command, duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
         realism=realism, physics=physics, push=push, push_at=push_at, seed=seed, video=video,
         say=_say, allow=allow,

@@ -32,7 +32,7 @@ class Rate(TypedDict):
     never_fell_ci95: NotRequired[Interval]
 
 
-class Rising(TypedDict, total=False):
+class RisingFigures(TypedDict, total=False):
     """Robots that were down, after a fall or from the start, and the share that got up again."""
 
     downs: int
@@ -41,7 +41,7 @@ class Rising(TypedDict, total=False):
     up_time_median: Number
 
 
-class Counts(Rate, Rising, total=False):
+class Counts(Rate, RisingFigures, total=False):
     """Counts of outcomes, and medians of recorded figures."""
 
     recovered_with_step: int

@@ -7,14 +7,14 @@ from poise.configs.problems import out_of_range
 
 from .layers import Layers
 from .motion_graph import MotionGraph, Transition, transition_order
-from .paths import Path, Task
+from .paths import Path, PathTask
 
 CHECKS = 200  # of the best path, before the search gives up
 
 
 def best_paths(
     graph: MotionGraph,
-    task: Task,
+    task: PathTask,
     k: int = 1,
     check: Callable[[Transition], str] | None = None,
 ) -> list[Path]:
@@ -53,7 +53,7 @@ def best_paths(
                       "one", source="graph")  # fmt: skip
 
 
-def _check(graph: MotionGraph, task: Task, k: int) -> None:
+def _check(graph: MotionGraph, task: PathTask, k: int) -> None:
     if k < 1:
         raise out_of_range(k, field="k", least=1)
     if not task.actions:

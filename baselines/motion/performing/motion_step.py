@@ -1,7 +1,5 @@
 """`feedback-step` that performs motions whose feet leave the ground."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from poise.baselines.balance.references.legs import PlantedLegs
@@ -105,13 +103,12 @@ class MotionStep(CaptureStep):
             self.perform_sets, capture.state, capture.reference_out, c.swing,
             self._swing.reference, self._axes,
         )  # fmt: skip
-        gains = replace(
-            capture.gains,
+        gains = capture.gains.replace(
             root_accel=c.root_accel * omega**2,
             swing_accel=c.swing_accel * omega**2,
             joint_accel=c.joint_accel * omega**2,
         )
-        return replace(capture, gains=gains, **ticks)
+        return capture.replace(gains=gains, **ticks)
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
         if self.performance is None:

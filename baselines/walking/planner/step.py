@@ -224,5 +224,5 @@ def swing_tick(t: WalkTick) -> None:
     else:
         advance_over(w, apex_of_step(t), c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first
-    contacts.limited[0] = 0
+    contacts.limited = 0
     solve_contacts(c, contacts)

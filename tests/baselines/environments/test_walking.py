@@ -200,9 +200,13 @@ def test_where_state_and_robot_are_uncertain_another_one_walks():
     env = ResidualBalanceEnv(robot(), controller="walk", **SHORT)
     field = ResidualBalanceEnv(robot(), controller="walk-field", realism="field", **SHORT)
 
+    mine = load_controller("walk-fast", robot())
+
     def end(env, level):
         env.realism = load_realism(level)
-        env.reset(seed=4, options={"command": FAST})
+        _, info = env.reset(seed=4, options={"command": FAST})
+        replaced = env is not field and level == "field" and env.controller is not mine
+        assert info.get("stand_in") == ("walk-field" if replaced else None)
         play(env, 1.0)
         return env.simulation.data.qpos.copy()
 
@@ -213,6 +217,6 @@ def test_where_state_and_robot_are_uncertain_another_one_walks():
     np.testing.assert_array_equal(end(env, "ideal"), itself)
     np.testing.assert_array_equal(end(env, "late"), late)
     assert np.abs(itself - late).max() > 1e-6 and np.abs(end(field, "ideal") - itself).max() > 1e-3
-    mine = env.controller = load_controller("walk-fast", robot())
+    env.controller = mine
     end(env, "field")
     assert env.controller is mine

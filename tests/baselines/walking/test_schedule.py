@@ -15,6 +15,7 @@ from poise.baselines.walking.schedule import (
     parse_commands,
 )
 from poise.configs.errors import ConfigError
+from poise.envs.physics.clock import Clock
 from tests.support.refused import refused
 
 
@@ -107,7 +108,7 @@ def test_a_fraction_of_the_commands_is_to_stand():
 
 def test_a_command_comes_at_its_time():
     """The latest whose time has come; an empty timetable leaves what was set by hand."""
-    clock, command = np.zeros(1, dtype=np.int64), np.zeros(3)
+    clock, command = Clock(0), np.zeros(3)
     table = empty_timetable()
     follower = Follower(table, clock, 0.002, command)
     command[:] = 7.0
@@ -115,7 +116,7 @@ def test_a_command_comes_at_its_time():
     assert command[0] == 7.0
     table.fill([TimedCommand(0.1), TimedCommand(0.2, start=0.5), TimedCommand(0.3, start=0.502)])
     seen = []
-    for clock[0] in (0, 249, 250, 251, 400):
+    for clock.steps in (0, 249, 250, 251, 400):
         follow_timetable(follower)
         seen.append(command[0])
     assert seen == [0.1, 0.1, 0.2, 0.3, 0.3]

@@ -24,7 +24,7 @@ from poise.training.benchmarking.evaluation import run
 from poise.training.cli import entry
 from poise.training.cli import train as train_command
 from poise.training.cli.entry import main
-from poise.training.cli.train import parse
+from poise.training.cli.train import parse_train
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.running.options.names import FIGURES
 from tests.support.evaluations import RANDOM, InProcess, write_suite
@@ -471,48 +471,48 @@ def test_flags_of_train_replace_fields_of_the_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("steps: 1000\nseed: 5\nppo: {n_envs: 4}\nenv: {duration: 3.0}\n")
     args = ["--config", str(path), "--out", "run", "--seed", "7", "--ppo.net-arch", "8", "16"]
-    command = parse([*args, "--env.pushes.magnitude", "0.1", "0.3", "--resume"])
+    command = parse_train([*args, "--env.pushes.magnitude", "0.1", "0.3", "--resume"])
     settings = command.settings
     assert (settings.steps, settings.seed, settings.ppo.n_envs) == (1000, 7, 4)
     assert settings.ppo.net_arch == (8, 16) and settings.env.duration == 3.0
     assert settings.env.pushes is not None and settings.env.pushes.magnitude == (0.1, 0.3)
     assert command.resume and command.out == Path("run")
     with pytest.raises(ConfigError, match="command line: env.duration"):
-        parse([*args, "--env.duration", "-1"])
+        parse_train([*args, "--env.duration", "-1"])
 
 
 def test_train_without_flags_is_the_packaged_configuration() -> None:
     """No flag changes a field by itself."""
-    command = parse(["--out", "run"])
+    command = parse_train(["--out", "run"])
     assert to_dict(command.settings) == to_dict(train_config(train_command.DEFAULT))
     assert not command.resume
 
 
 def test_a_quick_training_needs_no_folder() -> None:
     """The packaged configuration of that name; flags replace its fields. It stays small."""
-    command = parse(["--quick", "--seed", "3"])
+    command = parse_train(["--quick", "--seed", "3"])
     assert command.settings == replace(train_config("quick"), seed=3)
     assert command.out == Path("runs/quick") and command.settings.steps <= 500_000
-    assert parse(["--quick", "--out", "run"]).out == Path("run")
+    assert parse_train(["--quick", "--out", "run"]).out == Path("run")
 
 
 def test_another_robot_is_trained_by_a_configuration_that_fits_it() -> None:
     """The packaged default names bodies of the humanoid."""
-    settings = parse(["--out", "run", "--robot", "tall"]).settings
+    settings = parse_train(["--out", "run", "--robot", "tall"]).settings
     assert settings == replace(train_config(train_command.ANY_ROBOT), robot="tall")
     humanoid = str(resolve("robots", "humanoid"))
-    same = parse(["--out", "run", "--robot", humanoid]).settings
+    same = parse_train(["--out", "run", "--robot", humanoid]).settings
     assert same == replace(train_config(train_command.DEFAULT), robot=humanoid)
-    named = parse(["--out", "run", "--robot", "tall", "--config", "residual"]).settings
+    named = parse_train(["--out", "run", "--robot", "tall", "--config", "residual"]).settings
     assert named == replace(train_config("residual"), robot="tall")
 
 
 def test_resume_takes_the_runs_own_configuration(tmp_path: Path) -> None:
     """Without --config, a run goes on as it was started."""
     (tmp_path / "config.yaml").write_text("steps: 77\n")
-    command = parse(["--out", str(tmp_path), "--resume"])
+    command = parse_train(["--out", str(tmp_path), "--resume"])
     assert command.settings == TrainConfig(steps=77)
-    assert parse(["--out", str(tmp_path)]).settings.steps != 77
+    assert parse_train(["--out", str(tmp_path)]).settings.steps != 77
 
 
 def test_train_trains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

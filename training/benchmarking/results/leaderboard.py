@@ -9,7 +9,12 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_file, is_folder
 from poise.configs.texts import code, plain
-from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_cells
+from poise.training.benchmarking.evaluation.tables import (
+    IN_PAIRS,
+    ranked,
+    shared_ranks,
+    table_cells,
+)
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
     AIMED,
@@ -166,7 +171,7 @@ def _ranking(summary: Summary) -> Table:
     cells[CHATTER.heading] = [CHATTER.text(entries[name]) for name in names]
     at_levels = [dict(_realism(entries[name])) for name in names]
     cells |= {level: [own.get(level, NONE) for own in at_levels] for level in at_levels[0]}
-    rank = places(entries)
+    rank = shared_ranks(entries)
     rows = [
         [str(rank[name] or NONE), code(name), *texts]
         for name, texts in zip(names, zip(*cells.values(), strict=True), strict=True)

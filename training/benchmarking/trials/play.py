@@ -19,7 +19,7 @@ from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis, diagnose
 from poise.training.benchmarking.diagnosis.record import CourseRecord, swing_of
 
 from .agents import Agent
-from .gait_figures import NO_ERROR, SWING_TIME, TrackingError, Walk, near
+from .gait_figures import NO_ERROR, SWING_TIME, RecordedWalk, TrackingError, near
 from .gait_record import WalkRecord
 from .rising import Rise, Rising
 from .signals import Sway
@@ -100,7 +100,7 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     if trial.start is not None:
         return rise_trial(env, trial, stepped, watch)
     settled, course = Settled(), CourseRecord()
-    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    touchdowns = TouchdownCounter(len(env.robot.soles), env.config.policy_period)
     stands = not trial.commands and stepped.tracking is None
     sway = Sway() if trial.pushes and stands else None
     walk = WalkRecord() if trial.commands else None
@@ -115,7 +115,7 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
         each(env)
     outcome, loss = _outcome(env, trial, settled, touchdowns.count), "not quiet"
     if walk is not None:
-        outcome, loss = walked(env, trial, outcome, walk), "off command"
+        outcome, loss = walk_outcome(env, trial, outcome, walk), "off command"
         if left_command(trial, outcome) and outcome.own_speed_error is None:
             return against_unpushed(agent, trial, explained(env, trial, outcome, course, loss))
     elif stepped.tracking is not None:
@@ -146,7 +146,7 @@ def rise_trial(
     """Return the outcome of a trial that starts on the ground: `recovered` is to be up at its
     end."""
     rising, settled = Rising(env), Settled()
-    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    touchdowns = TouchdownCounter(len(env.robot.soles), env.config.policy_period)
     while not stepped.done:
         if watch is not None:
             watch(env)
@@ -175,7 +175,7 @@ def first_start(trial: Trial) -> float | None:
     return min((each.start for each in events), default=None)
 
 
-def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
+def walk_outcome(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
     """Return the outcome of a trial with commands, with the figures of its walk.
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
@@ -183,7 +183,9 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     beyond its last edge; it then has no recovery time and no drift.
     """
     assert isinstance(env, CommandedEnv)  # it has taken the commands
-    walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
+    walk = RecordedWalk(
+        record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0
+    )
     figures: dict[str, Any] = {
         name: None if value is None else _finite(value) for name, value in walk.figures().items()
     }
@@ -239,7 +241,7 @@ def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
         stepped.step()
         record(env)
     fell = env.simulation.time if env.fallen else None
-    own = Walk(record.arrays(), trial.commands, fell).own_error()
+    own = RecordedWalk(record.arrays(), trial.commands, fell).own_error()
     outcome = replace(outcome, **_errors("own", own))
     if own is not None and near(last, own):
         outcome = replace(outcome, recovered=True, **asdict(Diagnosis()))
@@ -284,7 +286,7 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,
         foot_drift=_finite(settled.foot_drift) if settled.steps and not trial.pushes else None,
         final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
-        final_lean=_finite(lean(env)),
+        final_lean=_finite(tilt_of(env)),
         root_force=_finite(m.root_force),
         edge_contacts=int(m.edge_contacts),
         surfaces_passed=surfaces_passed(env),
@@ -304,7 +306,7 @@ def surfaces_passed(env: BalanceEnv) -> int | None:
     return sum(bool(com[0] > each.x_min) for each in surfaces[1:]) if surfaces else None
 
 
-def lean(env: BalanceEnv) -> float:
+def tilt_of(env: BalanceEnv) -> float:
     """Return the tilt of the root from the standing posture [°], independent of yaw."""
     standing = env.simulation.arrays.root_standing[2]
     cosine = float(env.simulation.state.root_axes[2] @ standing)
@@ -343,7 +345,7 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-class Touchdowns:
+class TouchdownCounter:
     """Count touchdowns after a swing of at least `SWING_TIME`.
 
     Where the controller has a plan, only its planned steps count.

@@ -210,12 +210,12 @@ FORMER = {
 }
 
 
-def won(trial: Trial, outcome: Outcome) -> bool:
+def counts_as_won(trial: Trial, outcome: Outcome) -> bool:
     """Return whether a trial counts as won in J50, rankings and pairs: a walk on level ground
     without a fall, any other trial recovered."""
     return outcome.upright if trial.judged_by_falls else outcome.recovered
 
 
-def failed(error: Exception) -> Outcome:
+def failed_trial(error: Exception) -> Outcome:
     """Return the outcome of a trial in which the controller raised."""
     return Outcome(recovered=False, fallen=False, error=raised(error), loss="error")

@@ -88,6 +88,7 @@ def follow(
     directions: int = 8,
     tempo: float = 1.0,
     realism: str | None = None,
+    physics: str | None = None,
     waits: Switch = False,
     fastest: Switch = False,
     seed: int = 0,
@@ -113,6 +114,7 @@ def follow(
         directions: number of directions of the pushes, spread evenly.
         tempo: speed factor of the motion.
         realism: realism level: ideal, lab, field, or a .yaml file.
+        physics: the engine that steps the robot: mujoco, drake, or a .yaml file of its settings.
         waits: let the motion wait while the robot recovers.
         fastest: find the largest tempo at which none of the trials falls.
         seed: seed of starts and pushes.
@@ -130,7 +132,8 @@ def follow(
 
     script = find_script(motion) if names_script(motion) else None
     is_clip = Path(motion).suffix in (".npz", ".csv") or motion == "network"
-    check_names([controller], robot=robot, motion=None if script or is_clip else motion)
+    check_names([controller], robot=robot, motion=None if script or is_clip else motion,
+                physics=physics)  # fmt: skip
     from poise.baselines.balance.references.tempo import Tempo
     from poise.training.benchmarking.trials.push_limits import load_limits
     from poise.training.motion.following.fastest import STARTS, find_fastest
@@ -139,11 +142,11 @@ def follow(
     from poise.training.motion.following.tracked import follow_clip, following, tracker_config
     from poise.training.pictures.figures.encoder import check_video
     from poise.training.pictures.figures.playback import check_size
-    from poise.training.pictures.motion_report.film import Film
+    from poise.training.pictures.motion_report.film import MotionFilm
     from poise.training.pictures.motion_report.page import check_page
     from poise.training.pictures.motion_report.performance import Watched, write_performance
 
-    if fastest and (push or share or tempo != 1.0 or waits or out or report or video):
+    if fastest and (push or share or tempo != 1.0 or waits or out or report or video or physics):
         raise ConfigError("goes with --controller, --robot, --starts and --seed alone",
                           field="fastest")  # fmt: skip
     if out is not None:
@@ -181,7 +184,8 @@ def follow(
 
             tracked = follow_clip(following(tracker, motion), body,
                                   starts=20 if starts is None else starts, pushed=impulse,
-                                  directions=directions, seed=seed, realism=realism)  # fmt: skip
+                                  directions=directions, seed=seed, realism=realism,
+                                  physics=physics)  # fmt: skip
             print_followed(tracked, f"{Path(motion).stem} by {controller} on {robot}, {pushed}",
                            terminal())  # fmt: skip
             if out is not None:
@@ -192,11 +196,12 @@ def follow(
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return 0
         watched = Watched() if report is not None else None
-        film = None if video is None else stack.enter_context(Film(video, size, watched))
+        film = None if video is None else stack.enter_context(MotionFilm(video, size, watched))
         waits_so = Tempo(waits=True) if waits else None
         trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
                          impulse=push, share=share, directions=directions, seed=seed, speed=tempo,
-                         tempo=waits_so, watch=film or watched, realism=realism)  # fmt: skip
+                         tempo=waits_so, watch=film or watched, realism=realism,
+                         physics=physics)  # fmt: skip
         title = f"{Path(motion).stem} by {controller} on {robot}{faster}, {pushed}"
         if report is not None and watched is not None:  # while a script's motion is there
             write_performance(report, title, motion, robot, tempo, trials, watched)

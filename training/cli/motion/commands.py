@@ -227,7 +227,7 @@ def play(
         size: width and height of the video [pixels], even.
         planted: keep the feet planted even where they move in the clip.
     """
-    from poise.baselines.balance.references.robot_clip import check_robot, read_robot_clip
+    from poise.baselines.balance.references.robot_clip import check_clip_robot, read_robot_clip
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.training.pictures.figures.encoder import check_video
     from poise.training.pictures.figures.playback import check_size, write_playback
@@ -238,7 +238,7 @@ def play(
     body = load_robot(robot)
     if file.suffix == ".npz":
         clip = read_robot_clip(file)
-        check_robot(clip, body, str(file))
+        check_clip_robot(clip, body, str(file))
         print(f"{write_playback(video, body, clip.qpos, clip.dt, None, size)} frames")
         print(video)
         return
@@ -279,7 +279,7 @@ MOTION: dict[str, Callable[..., object]] = {
 }
 
 
-def run(args: Sequence[str]) -> int:
+def run_motion(args: Sequence[str]) -> int:
     """Run a sub-command of `poise motion`; returns 0, or 1 (see `check`)."""
     if not args or args[0] in ("-h", "--help", "--help-all"):
         print_commands(USAGE, MOTION, terminal())

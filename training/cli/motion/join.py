@@ -86,14 +86,14 @@ def match(
         start: where the motion begins, as CLIP@SECONDS; by default the first frame of the first
             clip.
     """
-    from poise.training.motion.following.matched import matched, parse_commands, print_matched
+    from poise.training.motion.following.matched import matched, parse_timed_commands, print_matched
 
     if out.suffix != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=out, choices=("*.bvh",))
     check_out_file(out)
     made, database = matched(files, commands, seconds, start)
     write_bvh(made.clip, out)
-    print_matched(made, database, parse_commands(commands), terminal())
+    print_matched(made, database, parse_timed_commands(commands), terminal())
     print(out)
 
 

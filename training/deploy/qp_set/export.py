@@ -41,10 +41,14 @@ def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, n
         qp, T, offset = tick.reduced, tick.torque_matrix, tick.torque_offset
     else:
         state = tick.state
-        tasks = [task.rows(state) for task in controller.tasks.values()]
         points = [contact.rows(state) for contact in controller.contacts.values()]
         qp = formulation.build(
-            state, tick.targets, controller.parameters, tick.cop_vel, tasks, points=points
+            state,
+            tick.targets,
+            controller.parameters,
+            controller.tasks.values(),
+            tick.cop_vel,
+            points=points,
         )
         joints = controller.arrays.motor_dofs - 6
         T = np.zeros((len(joints), len(qp.g)))

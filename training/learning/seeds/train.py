@@ -20,7 +20,7 @@ from poise.training.benchmarking.statistics.rates import seed_figures
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.curriculum import curriculum_levels
 from poise.training.learning.policy_files import CONFIG, LAST, find_checkpoint
-from poise.training.learning.train import check_folder, check_pushes, train
+from poise.training.learning.train import check_pushes, checkpoint_of, train
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.provenance import circumstances
@@ -72,7 +72,7 @@ def train_seeds(
     runs = [SeedRun(replace(config, seed=seed, threads=1), out / f"seed-{seed}") for seed in seeds]
     for run in runs:
         if find_checkpoint(run.folder / LAST) is not None:
-            check_folder(run.config, run.folder, resume=True)  # one of another configuration
+            checkpoint_of(run.config, run.folder, resume=True)  # one of another configuration
     missing = [run for run in runs if not run.entry()["finished"]]
     curriculum_levels(config)
     env = config.make_env()  # compiles all that the runs need, once

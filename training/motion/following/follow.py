@@ -16,6 +16,8 @@ from poise.configs.numbers import whole_number
 from poise.configs.problems import out_of_range
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import FallLimits
+from poise.envs.physics.engines.config import load_physics
+from poise.envs.physics.engines.engine import check_engine
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
@@ -61,6 +63,7 @@ def follow(
     watch: Callable[[Trial], Watch | None] | None = None,
     patient: bool = True,
     realism: str | Path | None = None,
+    physics: str | Path | None = None,
 ) -> list[Followed]:
     """Let a controller perform a motion from `starts` disturbed starts.
 
@@ -74,12 +77,14 @@ def follow(
 
     The motion runs `speed` times as fast, and waits as `tempo` defines. `watch(trial)` returns
     what is called with the environment after the reset and after every step. Without
-    `patient` the first fall ends the trials. `realism` is a level, by name or file.
+    `patient` the first fall ends the trials. `realism` is a level, by name or file;
+    `physics` the engine, by name or file.
 
     Raises:
-        ConfigError: no such motion, controller or robot, one that does not play motions, counts
-            below 1, an impulse, a share or a seed below 0, an impulse and a share, a share without
-            measured limits, a speed that is not from 0.1 to 10.
+        ConfigError: no such motion, controller, robot or engine, a robot that the engine does not
+            hold, a controller that does not play motions, counts below 1, an impulse, a share or a
+            seed below 0, an impulse and a share, a share without measured limits, a speed that is
+            not from 0.1 to 10.
     """
     if not 0.1 <= speed <= 10.0:
         raise out_of_range(speed, field="tempo", least=0.1, most=10, form="g")
@@ -92,10 +97,11 @@ def follow(
     if impulse and share:
         raise ConfigError("give either an impulse or a share of J50", field="share")
     body = robot if isinstance(robot, Robot) else load_robot(robot)
+    check_engine(load_physics(physics), body)
     half = load_limits(body).j50() if share else None
     reference = load_motion(motion, body)
     reference = reference if speed == 1.0 else reference.at_speed(speed)
-    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo, realism)
+    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo, realism, physics)
     rng = np.random.default_rng(seed)
     trials = []
     for k in range(starts):
@@ -105,7 +111,7 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        course = Course(reference.commands, None if watch is None else watch(trial))
+        course = FollowedWalk(reference.commands, None if watch is None else watch(trial))
         followed = _followed(run_trial(agent, trial, course), trial)
         walked, turned = course.shares()
         trials.append(replace(followed, walked=walked, turned=turned))
@@ -114,7 +120,7 @@ def follow(
     return trials
 
 
-class Course:
+class FollowedWalk:
     """Path of a robot while a walk is commanded: a `Watch` that also calls another."""
 
     def __init__(self, commands: np.ndarray | None, other: Watch | None = None):
@@ -165,6 +171,7 @@ def performer(
     fall: Mapping[str, float] | None = None,
     tempo: Tempo | None = None,
     realism: str | Path | None = None,
+    physics: str | Path | None = None,
 ) -> Agent:
     """Return an agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
 
@@ -177,6 +184,7 @@ def performer(
     given: dict[str, Any] = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
     given |= {} if tempo is None else {"tempo": tempo}
     given |= {} if realism is None else {"realism": load_realism(realism)}
+    given |= {} if physics is None else {"physics": load_physics(physics)}
     try:
         return load_agent(controller, robot, **given)
     except TypeError:

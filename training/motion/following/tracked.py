@@ -20,6 +20,8 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
 from poise.configs.problems import out_of_range
 from poise.envs.balance.mdp.termination import FallLimits
+from poise.envs.physics.engines.config import load_physics
+from poise.envs.physics.engines.engine import check_engine
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
@@ -69,6 +71,7 @@ def follow_clip(
     directions: int = 8,
     seed: int = 0,
     realism: str | Path | None = None,
+    physics: str | Path | None = None,
 ) -> list[Followed]:
     """Let a tracker follow its clip from `starts` disturbed starts in the clip's first frame.
 
@@ -79,16 +82,21 @@ def follow_clip(
 
     Args:
         pushed: the impulse [N·s] of a push in a direction [deg], as in `follow`; None: none.
+        physics: the engine, by name or file; None: MuJoCo.
 
-    Raises ConfigError as `PolicyFile`, for counts below 1, a seed or an impulse below 0.
+    Raises ConfigError as `PolicyFile`, for an engine that is not installed or does not hold the
+    robot, for counts below 1, a seed or an impulse below 0.
     """
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
     whole_number(seed, 0, "seed")
     level: dict[str, Any] = {} if realism is None else {"realism": load_realism(realism)}
+    engine = load_physics(physics)
+    check_engine(engine, robot)
     env = ResidualBalanceEnv(
-        robot, controller=config, pushes=None, duration=LONGEST, fall=ANYWHERE, **level
-    )
+        robot, controller=config, pushes=None, duration=LONGEST, fall=ANYWHERE, physics=engine,
+        **level,
+    )  # fmt: skip
     policy = env.controller
     assert isinstance(policy, PolicyFile) and policy.motion is not None
     track, rng, trials = policy.motion, np.random.default_rng(seed), []
@@ -112,7 +120,7 @@ def _followed(
     until = max(ends + AFTER, 0.0 if push is None else push.start + SETTLING)
     pushes = [] if push is None else [asdict(push)]
     env.reset(seed=seed, options={"push": pushes, "qpos": _start(env, track, seed)})
-    reference, rest = Reference(env.robot, track), np.zeros(len(env.action_names))
+    reference, rest = ClipReference(env.robot, track), np.zeros(len(env.action_names))
     while not fallen and env.simulation.time < until - 0.5 * period:
         env.step_without_info(rest)
         step = round(env.simulation.time / period)
@@ -143,7 +151,7 @@ def _start(env: ResidualBalanceEnv, track: MotionTrack, seed: int) -> np.ndarray
     return qpos
 
 
-class Reference:
+class ClipReference:
     """Joints, bodies and CoM of a clip where it has been laid."""
 
     def __init__(self, robot: Robot, track: MotionTrack):

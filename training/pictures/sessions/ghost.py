@@ -27,9 +27,10 @@ class Ghost:
     """
 
     def __init__(self, motion: ReferenceMotion, env: BalanceEnv):
-        bodies = load_extra("motions", "bodies", f"the motion {motion.name!r}")
-        self._bodies = bodies.ReferenceBodies(motion, env.robot)
-        self._stance, self._footing = bodies.Stance.of(env.simulation.state), motion.footing
+        what = f"the motion {motion.name!r}"
+        self._bodies = load_extra("motions", "bodies", what)(motion, env.robot)
+        self._stance = load_extra("motions", "sole_places", what).of(env.simulation.state)
+        self._footing = motion.footing
         self._bodies.at(0.0, self._stance)
         self._frame = self._bodies.origin.copy(), self._bodies.turn.copy()
 
@@ -53,7 +54,7 @@ class Ghost:
         return self._stance._replace(points=points, axes=axes)
 
 
-class Seen:
+class GhostBodies:
     """The bodies of postures that can only be seen, from where the robot stood at its reset."""
 
     def __init__(self, clip: RobotClip, robot: Robot):

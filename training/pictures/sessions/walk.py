@@ -35,7 +35,7 @@ Say = Callable[[str], object]  # prints a line
 
 
 @allows("controller")
-def walk(
+def play_walk(
     command: Mapping[str, float | None],
     *,
     duration: float = 20.0,

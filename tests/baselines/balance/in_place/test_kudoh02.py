@@ -70,7 +70,7 @@ def test_abe07_is_the_momentum_qp_without_cop_control():
     assert cop.weight == 0.0 and cop.yaw_weight == 0.0
     assert found == replace(baseline, posture=posture, cop=cop)
     controller = load_controller("abe07", robot())
-    np.testing.assert_array_equal(controller.parameters.angular_weight, 0.0)
+    np.testing.assert_array_equal(controller.tasks["cop"].block.weight, 0.0)
 
 
 @pytest.mark.parametrize("name", packaged("controllers"))

@@ -12,7 +12,7 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.space_time.constraints.constraint import Constraint, When
-from poise.baselines.motion.space_time.constraints.points import Height, Keep, Reach
+from poise.baselines.motion.space_time.constraints.points import Height, Keep, PointReach
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, Solver, retarget_clip
 from poise.configs.errors import ConfigError
 from tests.support.captured import captured
@@ -21,7 +21,7 @@ from tests.support.refused import refused
 
 LEAD = 0.3
 WANTED: tuple[Constraint, ...] = (
-    Reach(point="hand_right", place=(0.3, 0.2, 1.3), period=When(at=0.3)),
+    PointReach(point="hand_right", place=(0.3, 0.2, 1.3), period=When(at=0.3)),
     Keep(point="hand_left", period=(0.1, 0.5)),
 )
 

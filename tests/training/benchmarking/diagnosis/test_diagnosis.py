@@ -16,10 +16,10 @@ from poise.training.benchmarking.diagnosis.diagnosis import (
     _capture,
     _foothold,
     _saturated,
-    distance_outside,
+    distance_outside_polygon,
     touching_body,
 )
-from poise.training.benchmarking.diagnosis.record import Course, CourseRecord
+from poise.training.benchmarking.diagnosis.record import CourseRecord, TrialCourse
 from poise.training.benchmarking.diagnosis.words import (
     cause,
     diagnosis_of,
@@ -49,9 +49,9 @@ def legs(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def course(rows: int = 10) -> Course:
+def course(rows: int = 10) -> TrialCourse:
     """Two soles that stand still on a square, nothing at its limit."""
-    return Course(
+    return TrialCourse(
         time=0.02 * np.arange(rows),
         load=np.zeros((rows, 2)),
         capture_point=np.full((rows, 2), 0.5),
@@ -74,7 +74,7 @@ def test_the_distance_outside_is_that_from_the_nearest_edge_or_corner(
 ) -> None:
     """Whichever way round the corners go."""
     for polygon in (SQUARE, SQUARE[::-1]):
-        assert distance_outside(polygon, np.array(point)) == pytest.approx(distance)
+        assert distance_outside_polygon(polygon, np.array(point)) == pytest.approx(distance)
 
 
 def test_the_first_motor_at_its_limit_after_the_push() -> None:

@@ -27,7 +27,7 @@ from poise.training.benchmarking.evaluation.run import compared
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import replay
 from poise.training.benchmarking.trials.agents import load_agent
-from poise.training.benchmarking.trials.jobs import Job, Stage, play
+from poise.training.benchmarking.trials.jobs import Job, TrialStage, run_job
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.table import outcome_cells
 from poise.training.benchmarking.trials.trial import Conditions, Trial
@@ -251,10 +251,10 @@ def test_a_controller_that_cannot_be_loaded_is_no_trial(
     with pytest.raises(KeyboardInterrupt):
         benchmark(["flaky.py:Flaky"], suite, out=out)
     before = (out / "trials.jsonl").read_bytes()
-    job = Job(Stage("humanoid", 1.6, StartNoise()), "gone.py:Gone", Trial(0, 5))
+    job = Job(TrialStage("humanoid", 1.6, StartNoise()), "gone.py:Gone", Trial(0, 5))
     with poise.allowing("gone.py:Gone"):
         with pytest.raises(ConfigError, match="gone.py.*cannot be imported"):
-            play(job)
+            run_job(job)
     (tmp_path / "flaky.py").write_text(FLAKY + "# changed")
     with pytest.raises(ConfigError, match="holds trials of 'flaky.py:Flaky', which has changed"):
         benchmark(["zero"], suite, out=out, allow="flaky.py:Flaky")

@@ -107,6 +107,24 @@ def test_the_summary_tells_a_level(tmp_path: Path, in_process: type[InProcess]) 
     assert summary["realism"] == "late+arms"
 
 
+def test_a_controller_that_ran_in_place_of_another_is_named(
+    tmp_path: Path, in_process: type[InProcess]
+) -> None:
+    """In the summary, with its trials, and in a line under the table; not where none ran."""
+    suite, text = write_suite(tmp_path, random_suite(2)), io.StringIO()
+    names = ["feedback-step", "momentum-qp"]
+    for level, expected in (("field", {"feedback-step-field": 2}), ("ideal", None)):
+        console = Console(file=text, width=200)
+        out = tmp_path / level
+        summary = evaluate(names, suite, out=out, realism=level, console=console)
+        entries = summary["controllers"]
+        assert entries["feedback-step"].get("stand_ins") == expected
+        assert "stand_ins" not in entries["momentum-qp"]
+        assert read_summary(out / "summary.json")["controllers"].keys() == entries.keys()
+    line = "feedback-step: feedback-step-field ran in its place in 2 of 2 trials"
+    assert text.getvalue().count(line) == 1
+
+
 def test_a_stopped_evaluation_ends_as_if_it_had_not_been(
     tmp_path: Path, in_process: type[InProcess]
 ) -> None:

@@ -22,10 +22,10 @@ from poise.training.benchmarking.metrics.pairs import alike, pair_figures, paire
 from poise.training.benchmarking.results.compare import compare, print_comparison
 from poise.training.benchmarking.results.leaderboard import leaderboard, write_leaderboard
 from poise.training.benchmarking.results.summary import read_summary
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.benchmarking.trials.table import COLUMNS, trial_row
-from poise.training.benchmarking.trials.trial import Trial, failed
+from poise.training.benchmarking.trials.trial import Trial, failed_trial
 from poise.training.cli.entry import main
 from poise.training.running.files import csv_text
 from poise.training.running.provenance import Circumstances
@@ -36,7 +36,7 @@ from tests.training.benchmarking.evaluation.test_folder import OUTCOME
 from tests.training.benchmarking.suites.test_factors import part, small, won_below
 
 WON = replace(OUTCOME, sway=0.1, sway_recovery=1.0)
-LOST = failed(RuntimeError("no"))
+LOST = failed_trial(RuntimeError("no"))
 
 
 CIRCUMSTANCES: Circumstances = {
@@ -240,7 +240,7 @@ def test_the_ankle_limit_may_be_told_in_more_directions(tmp_path: Path) -> None:
     assert error.value.field == "robot"
 
 
-def every(plan: Plan, edge: float = 1e9) -> list[Trial]:
+def every(plan: TrialPlan, edge: float = 1e9) -> list[Trial]:
     """All trials of a controller that recovers pushes below an impulse in the first stage."""
     return plan.trials(won_below(plan, edge))[plan.names[0]]
 

@@ -12,6 +12,8 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import on_terrain
+from poise.envs.terrain.terrain import make_terrain
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.motion.following.fastest import fastest
 from poise.training.motion.following.follow import follow
@@ -41,6 +43,22 @@ def test_a_motion_in_field_is_off_by_what_sensors_are_off_and_does_not_fall() ->
     assert not any(trial.fallen for trial in [*ideal, *field])
     assert max(trial.body_error for trial in ideal) < 6e-3
     assert 1e-2 < np.mean([trial.body_error for trial in field]) < 6e-2
+
+
+def test_a_motion_is_followed_in_another_engine() -> None:
+    """Nearly as well as in MuJoCo, but not the same; a walk on what it does not hold is refused."""
+    pytest.importorskip("pydrake", reason="Drake is not installed: pip install --no-deps drake")
+    robot = robot_named("humanoid")
+    (own,), (other,) = (
+        follow("bow", robot=robot, starts=1, seed=25, physics=engine)
+        for engine in ("mujoco", "drake")
+    )
+    assert not own.fallen and not other.fallen
+    assert other.body_error < 6e-3 and other.body_error != own.body_error
+    assert own == follow("bow", robot=robot, starts=1, seed=25)[0]
+    uneven = on_terrain(robot, make_terrain("stairs", "test"))
+    with pytest.raises(ConfigError, match=r"drake does not hold terrain \(stairs\)"):
+        follow("bow", robot=uneven, starts=1, physics="drake")
 
 
 def test_a_row_of_levels_has_falls_and_means_of_those_that_stay_up() -> None:

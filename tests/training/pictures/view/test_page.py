@@ -41,7 +41,13 @@ from poise.training.pictures.view import browser
 from poise.training.pictures.view.browser import BrowserView
 from poise.training.pictures.view.origins import Visits
 from poise.training.pictures.view.server import check_port, greeting, serving
-from poise.training.pictures.view.stage import FIELD_OF_VIEW, LANE, Stage, first_view, ground_meshes
+from poise.training.pictures.view.stage import (
+    FIELD_OF_VIEW,
+    LANE,
+    ViewStage,
+    first_view,
+    ground_meshes,
+)
 from poise.training.pictures.view.walking import Throttle
 from tests.support.browser import CHROMIUM, Browser
 from tests.support.refused import refused
@@ -566,7 +572,7 @@ def test_the_page_builds_the_ground_and_goes_down_with_the_robot(
     """Once for as long as it is the same; the page's floor is as far below as the robot's."""
     session.reset()
     frame = Live(session).history[0][0]
-    stage = Stage(server, robot(), ["a", "b"], lambda *_: None)
+    stage = ViewStage(server, robot(), ["a", "b"], lambda *_: None)
     stage.show([frame, frame])
     assert not stage.boxes and stage.floor == 0.0
     surfaces = surface_arrays(Stairs(down=True).surfaces())
