@@ -217,7 +217,7 @@ def bad_input(
 
 
 #: command | problem | source | field | what is meant | facts
-WRONG = """
+REFUSED = """
 evaluate zero --workers 0 | range |  | workers |  | least=1
 evaluate zero --trials 0 | range |  | trials |  | least=1
 evaluate pid | unknown controller |  | controller | pd | value='pid'
@@ -280,7 +280,7 @@ robot g1 | unknown name |  | robots | unitree_g1 | value='g1'
 """
 
 
-@pytest.mark.parametrize("line", WRONG.strip().splitlines())
+@pytest.mark.parametrize("line", REFUSED.strip().splitlines())
 def test_bad_input_is_one_line_and_exit_code_2(
     line: str,
     tmp_path: Path,
