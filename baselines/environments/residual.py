@@ -11,7 +11,7 @@ from poise.baselines.allowance import allowing, named
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion, command_options
 from poise.baselines.balance.references.targets import motion_arrays
-from poise.baselines.balance.references.tempo import TIME, Pace, Tempo
+from poise.baselines.balance.references.tempo import Pace, Tempo
 from poise.baselines.controller import Controller, Targets, as_base_controller
 from poise.baselines.registry import (
     ControllerConfig,
@@ -172,7 +172,7 @@ class ResidualBalanceEnv(ControlledEnv):
     def motion_time(self) -> float:
         """Time of the motion now; that since the reset unless it waits [s]."""
         pace = self._motion.pace
-        return float(pace.memory[TIME]) if pace.waits else self.simulation.time
+        return pace.time if pace.waits else self.simulation.time
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; robot and motion are shared.
@@ -235,7 +235,7 @@ class ResidualBalanceEnv(ControlledEnv):
             options = {**options, "command": command_options(self.motion.commands)}
         self._begin_walk(options)
         self._motion.pace.clear()
-        self._offsets[:] = 0.0
+        self._offsets.clear()
         self._residual.torques[:] = 0.0
         forget_pushes(self._push_force)
         set_targets(self._target_inputs())

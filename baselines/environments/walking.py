@@ -16,12 +16,11 @@ from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .commanded import check_reach
 from .stepping import ResidualStepEnv
-from .walk_terms import WALK_REPORTED, WALK_TERMS, Strides, WalkReporter, WalkView, report_walk
+from .walk_terms import WALK_TERMS, Strides, WalkReport, WalkReporter, WalkView, report_walk
 
 
 class ResidualWalkEnv(ResidualStepEnv):
@@ -73,7 +72,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         **arguments: Any,
     ):
         self.command_sampler = CommandSampler() if command is None else command_sampler(command)
-        self._walk_report = guarded_zeros(WALK_REPORTED)
+        self._walk_report = WalkReport.allocate()
         self._strides = Strides.allocate()
         super().__init__(robot, config, controller=controller, **arguments)
 
@@ -126,7 +125,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         return [*super()._reports(tick), (report_walk, self._reporter())]
 
     def _observe(self) -> None:
-        self._step_report[:] = self.stepper.stepping().entries()
+        self._step_report.fill(self.stepper.stepping())
         report_walk(self._reporter())
         super()._observe()
 

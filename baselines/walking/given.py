@@ -79,11 +79,7 @@ def _length(surface: Surface) -> float:
 
 def allocate_treads(config: TreadConfig, surfaces: list[Surface], units: Units) -> Treads:
     """The block of the surfaces on which steps are given."""
-    c = config
     return Treads.allocate(
-        **in_si(Treads, c, units),
+        **in_si(Treads, config, units),
         surfaces=surface_arrays(surfaces),
-        hold=np.array([c.hold_up, c.hold_down]),
-        rise=np.array([c.rise, c.rise_down]),
-        lower=np.array([c.lower, c.lower_down]),
     )

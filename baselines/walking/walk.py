@@ -1,8 +1,7 @@
 """Walking at a commanded velocity, and standing as `capture-step` does where none is asked for."""
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.envs.compiled.maths.pendulum import Units
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 from poise.envs.terrain.flat import Flat
@@ -29,7 +29,7 @@ from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference, leg_task
 from .planner.arms import allocate_arms
 from .planner.blocks import Gait, WalkTick
-from .planner.command import GaitCommand
+from .planner.command import ENTRIES, STEP_PARAMETERS, GaitCommand
 from .planner.reach import Reach, check_command, reach_of
 from .tick import walk_tick
 
@@ -44,8 +44,12 @@ def allocate_gait(
     numbers = in_si(Gait, config, units)
     if limits is None:
         numbers["speed_margin"] = np.inf
+    command = guarded_zeros(ENTRIES)
+    parts = {f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)}
     return Gait.allocate(
         **numbers,
+        command=command,
+        **parts,
         **in_si(Gait, limits or config.limits, units),
         treads=allocate_treads(config.treads, list(surfaces), units),
     )
@@ -103,7 +107,7 @@ class Walk(Commanded, CaptureStep):
     @property
     def walking(self) -> bool:
         """True from the first shift of weight until the walk has stopped."""
-        return bool(self.gait.walking[0])
+        return bool(self.gait.walking)
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with the limits of this robot for a command out of its reach."""
@@ -130,11 +134,9 @@ class Walk(Commanded, CaptureStep):
         limits = limits_of_legs(self.robot, self._gait_config)
         self.gait_limits = limits or self._gait_config.limits
         gait = allocate_gait(self._gait_config, self.robot.units, limits, given)
-        members = {item.name: getattr(self.gait, item.name) for item in fields(Gait)}
-        kept: dict[str, Any] = {
-            name: each for name, each in members.items() if isinstance(each, np.ndarray)
-        }
-        self.gait, self._terrain, self._walk_tick = replace(gait, **kept), terrain, None
+        members = self.gait.named().items()
+        kept = {name: each for name, each in members if isinstance(each, np.ndarray)}
+        self.gait, self._terrain, self._walk_tick = gait.replace(**kept), terrain, None
 
     @property
     def failures(self) -> int:
@@ -145,10 +147,8 @@ class Walk(Commanded, CaptureStep):
         """Forget the last trial, its command too."""
         super().reset(state)
         self.gait_sets.reset()
-        for member in self.gait.members():
-            if isinstance(member, np.ndarray):
-                member[...] = 0
-        self.gait.treads.leaning[:] = 0.0
+        self.gait.clear()
+        self.gait.treads.leaning = 0.0
 
     def block(self, state: RobotState, targets: Targets) -> WalkTick:
         """See `CaptureStep`."""

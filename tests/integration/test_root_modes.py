@@ -7,7 +7,6 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config
-from poise.envs.balance.episode import ROOT_FORCE
 from tests.support.physics import controller, recovery, robot_named
 
 
@@ -58,7 +57,7 @@ def test_a_soft_root_never_falls(robot, direction):
             if env.fallen:
                 break
         fell[root] = env.fallen
-        leaned = env.episode.metrics[ROOT_FORCE]
+        leaned = env.episode.metrics.root_force
         assert (leaned > 50.0) == (root == "soft")  # [N]
         assert np.abs(env.controller.root_wrench).max() > 0.0 or root == "hard"
     assert fell == {"soft": False, "hard": True}

@@ -14,11 +14,12 @@ import numpy as np
 from poise.baselines.whole_body.parts.part import Bound
 from poise.baselines.whole_body.tasks.task import Rows, Task, TaskTick
 from poise.configs.kinds import OfKind
-from poise.envs.compiled.block import Block, Integer, Number
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.easing import eased
 from poise.envs.compiled.maths.pendulum import Units
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -26,20 +27,20 @@ from poise.envs.robots.robot import Robot
 from .legs import LegArrays
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Reference(Block):
     """Inputs and outputs of a model; legs in the order of the soles."""
 
     legs: LegArrays
     gravity: float  # g [m/s²]
     period: float  # of a tick [s]
-    begun: Integer  # 0 in the first tick of a walk
+    begun: Mutable[int]  # 0 in the first tick of a walk
     share: Annotated[np.ndarray, 3, 2]  # of the load that each leg is to bear, and its rates [s]
     com_vel: Annotated[np.ndarray, 2]  # horizontal [m/s]
     com_acc: Annotated[np.ndarray, 2]  # horizontal, asked for [m/s²]
     cop: Annotated[np.ndarray, 2]  # asked for [m]
     ahead: Annotated[np.ndarray, 2]  # unit vector of the heading
-    time_left: Number  # until touchdown, or until the foot behind leaves [s]
+    time_left: Mutable[float]  # until touchdown, or until the foot behind leaves [s]
     landing: Annotated[np.ndarray, 2]  # the swinging sole's foothold [m]
     # answers: by how much the CoM is to be higher [m], ż and z̈ [m, s]; accelerations of the
     # flexions, forward ones of the thighs [rad/s²], and their weights

@@ -151,7 +151,7 @@ def test_success_is_not_to_fall():
     for ahead, kick, well in ((0.0, 0.0, True), (0.5, 0.0, True), (0.5, 4.0, False)):
         pushes = {"push": Kick(0.2, kick, 90.0)} if kick else {}
         env.reset(seed=0, options={"command": {"ahead": ahead}, **pushes})
-        while env.episode.running[0]:
+        while env.episode.running:
             env.step_without_info(np.zeros(env.action_space.shape))
         assert env.recovered == well == (not env.fallen), ahead
 

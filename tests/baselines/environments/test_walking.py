@@ -164,7 +164,7 @@ def test_success_is_not_to_fall(env):
     env._strides.error[0] = 0.5
     assert not env.fallen and env.info()["is_success"] is True
     env.reset(seed=1, options={"push": Kick(0.5, 4.0, 90.0)})
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(np.zeros(env.action_space.shape))
     assert env.fallen and env.info()["is_success"] is False
 

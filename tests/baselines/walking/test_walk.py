@@ -127,7 +127,7 @@ def test_step_time_and_width_are_commanded():
         (2.0, GaitCommand(**still)), (4.0, GaitCommand(**still, step_time=0.45, width=0.28))
     )
     gait, state = env.controller.gait, env.simulation.state
-    assert not env.fallen and env.controller._swing.duration[0] == pytest.approx(0.45, abs=0.05)
+    assert not env.fallen and env.controller._swing.duration == pytest.approx(0.45, abs=0.05)
     across = np.array([-state.heading[1], state.heading[0]])
     feet = state.sole_points[:, :2]
     assert abs((feet[0] - feet[1]) @ across) == pytest.approx(0.28, abs=0.04)
@@ -135,7 +135,7 @@ def test_step_time_and_width_are_commanded():
     env.controller.command = GaitCommand(0.2)
     for _ in range(150):
         env.step(np.zeros(len(env.action_names)))
-    assert env.controller._swing.duration[0] == pytest.approx(gait.step_time, abs=0.05)
+    assert env.controller._swing.duration == pytest.approx(gait.step_time, abs=0.05)
 
 
 def test_a_step_time_of_a_command_is_above_zero():
@@ -181,7 +181,7 @@ def test_a_step_is_not_commanded_to_be_quicker_than_the_legs():
     _, _, env = walk((2.0, GaitCommand(0.2, step_time=0.05)))
     gait = env.controller.gait
     assert not env.fallen
-    assert env.controller._swing.duration[0] >= gait.time_min - 1e-9
+    assert env.controller._swing.duration >= gait.time_min - 1e-9
 
 
 def test_legs_that_would_land_too_late_do_not_walk():
@@ -228,9 +228,9 @@ def test_a_caught_walk_goes_on():
     push = {"impulse": 20.0, "direction": 90.0, "start": 4.0, "duration": 0.1}
     env.reset(seed=0, options={"push": [push], "command": {"ahead": 0.3}})
     gait, action, rows = env.controller.gait, np.zeros(len(env.action_names)), []
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(action)
-        rows.append((env.simulation.time, env.controller.walking, bool(gait.caught[0])))
+        rows.append((env.simulation.time, env.controller.walking, bool(gait.caught)))
     assert not env.fallen
     time, walking, caught = np.array(rows).T
     assert walking[(time > 1.0) & (time < 4.0)].all() and not caught[time < 4.0].any()
@@ -245,9 +245,9 @@ def test_the_miss_is_what_the_cop_leaves():
     push = {"impulse": 25.0, "direction": 90.0, "start": 3.0, "duration": 0.1}
     env.reset(seed=0, options={"push": [push], "command": {"ahead": 0.3}})
     gait, misses = env.controller.gait, []
-    while env.episode.running[0] and env.simulation.time < 4.0:
+    while env.episode.running and env.simulation.time < 4.0:
         env.step_without_info(np.zeros(len(env.action_names)))
-        misses.append((env.simulation.time, float(gait.miss[0])))
+        misses.append((env.simulation.time, float(gait.miss)))
     time, miss = np.array(misses).T
     before = miss[(time > 1.5) & (time < 3.0)]
     assert miss[time > 3.0].max() > 0.1 > 3.0 * np.median(before)

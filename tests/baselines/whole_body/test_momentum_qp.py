@@ -281,7 +281,7 @@ def test_other_robots_stand_as_described(name):
     """`com.offset` was searched on the default humanoid; others do not lean for it."""
     env = ResidualBalanceEnv(name, duration=4.0, pushes=None)
     env.reset(seed=3)
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(np.zeros(4))
     state, standing = env.simulation.state, env.simulation.arrays.root_standing
     assert np.degrees(np.arccos(state.root_axes[2] @ standing[2])) < 0.3

@@ -11,7 +11,6 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.walking.simbicon import Simbicon
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import FAILURES
 
 UNSEEN = (PolicyFile, Simbicon)  #: they step without a readable plan
 
@@ -73,7 +72,7 @@ class CourseRecord:
             "capture_point": s.capture_point.copy(),
             "supports": s.support[: s.support_size[0]].copy(), "contacts": s.contacts > 0.5,
             "soles": s.sole_point[:, :2].copy(), "foothold": foothold, "swinging": foot,
-            "failures": float(env.episode.metrics[FAILURES]),
+            "failures": float(env.episode.metrics.failures),
         })  # fmt: skip
 
     def course(self) -> Course:

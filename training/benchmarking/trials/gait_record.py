@@ -7,7 +7,6 @@ import numpy as np
 
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import ENERGY, POSITIVE_WORK
 from poise.envs.physics.legs import find_legs
 
 
@@ -44,7 +43,7 @@ class WalkRecord:
             env.simulation.time, state.com[:2].copy(), state.heading_yaw,
             state.contacts > 0.5, state.sole_points[:, :2].copy(),
             state.sole_points[:, 2].copy(), float(state.angular_momentum[2]), np.array(knees),
-            float(metrics[ENERGY]), float(metrics[POSITIVE_WORK]),
+            float(metrics.energy), float(metrics.positive_work),
         ))  # fmt: skip
 
     def arrays(self) -> WalkArrays:

@@ -12,7 +12,6 @@ import numpy as np
 from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis, diagnose
@@ -67,7 +66,7 @@ class SteppedTrial:
         """Continue for `duration` [s] with a fallen robot, at most until it is up again."""
         env, rising = self._agent.env, Rising(self._agent.env)
         for _ in range(round(duration / env.config.policy_period)):
-            if not env.episode.running[0] or rising.held:
+            if not env.episode.running or rising.held:
                 break
             self.step()
             rising.update()
@@ -106,7 +105,7 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     if outcome.recovered:
         return outcome
     outcome = explained(env, trial, outcome, course, loss)
-    if trial.get_up and env.fallen and env.episode.running[0]:
+    if trial.get_up and env.fallen and env.episode.running:
         return replace(outcome, **asdict(stepped.rise(trial.get_up)))
     return outcome
 
@@ -247,26 +246,26 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         recovered=recovered,
         fallen=env.fallen,
         fall_time=env.simulation.time if env.fallen else None,
-        recovery_time=max(float(m[episode.LAST_MOVING]) - pushed, 0.0) if recovered else None,
-        foot_displaced=bool(m[episode.MAX_SLIDE] > FOOT_DISPLACED),
+        recovery_time=max(float(m.last_moving) - pushed, 0.0) if recovered else None,
+        foot_displaced=bool(m.max_slide > FOOT_DISPLACED),
         steps=touchdowns,
-        max_com=_finite(m[episode.MAX_COM]),
-        max_capture=_finite(m[episode.MAX_CAPTURE]),
-        min_cop_margin=_finite(m[episode.MIN_COP_MARGIN]),
-        max_slide=_finite(m[episode.MAX_SLIDE]),
-        energy=_finite(m[episode.ENERGY]),
-        peak_torque=_finite(m[episode.PEAK_TORQUE]),
-        saturation=float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
-        mean_power=_finite(m[episode.ENERGY] / max(m[episode.TORQUE_TIME], TINY)),
-        torque_variation=_finite(m[episode.TORQUE_VARIATION] / max(m[episode.TORQUE_TIME], TINY)),
-        solver_failures=int(m[episode.FAILURES]),
+        max_com=_finite(m.max_com),
+        max_capture=_finite(m.max_capture),
+        min_cop_margin=_finite(m.min_cop_margin),
+        max_slide=_finite(m.max_slide),
+        energy=_finite(m.energy),
+        peak_torque=_finite(m.peak_torque),
+        saturation=float(m.saturated / max(m.ticks, 1.0)),
+        mean_power=_finite(m.energy / max(m.torque_time, TINY)),
+        torque_variation=_finite(m.torque_variation / max(m.torque_time, TINY)),
+        solver_failures=int(m.failures),
         mean_abs_action=settled.actions / settled.steps if settled.steps else None,
         com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,
         foot_drift=_finite(settled.foot_drift) if settled.steps and not trial.pushes else None,
         final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
         final_lean=_finite(lean(env)),
-        root_force=_finite(m[episode.ROOT_FORCE]),
-        edge_contacts=int(m[episode.EDGE_CONTACTS]),
+        root_force=_finite(m.root_force),
+        edge_contacts=int(m.edge_contacts),
         surfaces_passed=surfaces_passed(env),
         drawn=drawn_robot(env),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.reference_motion import AHEAD, START, TURN, ReferenceMotion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion, WalkCommand
 from poise.baselines.balance.references.tempo import Tempo
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_number
@@ -122,7 +122,8 @@ class Course:
 
     def __call__(self, env: BalanceEnv) -> object:
         commands, time = self._commands, env.simulation.time
-        if commands is not None and commands[1, START] <= time <= commands[-1, START]:
+        starts = None if commands is None else np.asarray(WalkCommand(*commands.T).start)
+        if starts is not None and starts[1] <= time <= starts[-1]:
             state = env.simulation.state
             heading = np.arctan2(state.heading[1], state.heading[0])
             self._gone.append((*state.com[:2], heading))
@@ -136,7 +137,8 @@ class Course:
         yaw = np.unwrap(gone[:, 2])
         axes = np.column_stack([np.cos(yaw), np.sin(yaw)])[1:]
         way = float((np.diff(gone[:, :2], axis=0) * axes).sum())
-        asked = np.diff(commands[:, START]) @ commands[:-1, [AHEAD, TURN]]
+        start, ahead, _, turn, _ = WalkCommand(*commands.T)
+        asked = np.diff(start) @ np.stack([ahead, turn], axis=1)[:-1]
         done = np.array([way, yaw[-1] - yaw[0]])
         shares = np.where(np.abs(asked) > LITTLE, done / np.where(asked == 0.0, 1.0, asked), np.nan)
         return float(shares[0]), float(shares[1])

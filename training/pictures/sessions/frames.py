@@ -10,6 +10,7 @@ from poise.baselines.controller import BaseController
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
+from poise.envs.terrain.arrays import SURFACE
 from poise.envs.terrain.terrain import Surface, height_at
 from poise.envs.viewing.contact_forces import ContactForces
 from poise.envs.viewing.overlays import Mark, foothold_mark, marks
@@ -25,7 +26,7 @@ VALUES = {
 }
 
 
-LEVEL = np.zeros((0, 6))  # no surfaces
+LEVEL = np.zeros(0, SURFACE)  # no surfaces
 
 
 class Frame(NamedTuple):
@@ -40,8 +41,8 @@ class Frame(NamedTuple):
         fall_time: when it fell [s]; None: it has not.
         ghost: where the bodies are if the reference motion is followed exactly; None: it has none
             that moves.
-        surfaces: (n, 6) of the ground, as `Surface`; the same array for as long as it is the same
-            ground.
+        surfaces: (n,) of the ground, see `surface_arrays`; the same array for as long as it is the
+            same ground.
         floor: height of the plane below them [m].
     """
 

@@ -179,7 +179,7 @@ def _below(frame: Frame) -> np.ndarray:
 
 
 def ground_meshes(surfaces: np.ndarray, floor: float, half: float) -> dict[int, Triangles]:
-    """Boxes between the surfaces (n, 6) and the floor [m]: it lets through what is below it.
+    """Boxes between the surfaces (n,) and the floor [m]: it lets through what is below it.
 
     Args:
         surfaces: as of `Surface`.

@@ -38,9 +38,9 @@ def test_up_is_a_second_without_a_break():
 
     def place(qpos: np.ndarray, seconds: float) -> None:
         for _ in range(round(seconds / period)):
-            clock = env.simulation.clock[0]
+            clock = env.simulation.clock.steps
             env.simulation.reset(qpos)
-            env.simulation.clock[0] = clock + round(period / env.arrays.timestep)
+            env.simulation.clock.steps = clock + round(period / env.arrays.timestep)
             rising_.update()
 
     place(lying, 1.0)

@@ -77,11 +77,11 @@ def test_the_record_ends_after_the_motion_and_after_the_push() -> None:
     env = ResidualBalanceEnv(robot_named("humanoid"), pushes=None, duration=60.0)
     env.reset(seed=0)
     alone, pushed = Tracking(env), Tracking(env, [2.0])
-    env.simulation.clock[0] = round(3.98 / env.arrays.timestep)
+    env.simulation.clock.steps = round(3.98 / env.arrays.timestep)
     assert not alone.ended and not pushed.ended
-    env.simulation.clock[0] = round(4.0 / env.arrays.timestep)
+    env.simulation.clock.steps = round(4.0 / env.arrays.timestep)
     assert alone.ended and not pushed.ended
-    env.simulation.clock[0] = round(8.0 / env.arrays.timestep)
+    env.simulation.clock.steps = round(8.0 / env.arrays.timestep)
     assert pushed.ended
     assert np.isnan(alone.figures().body_error)  # no step was taken
 

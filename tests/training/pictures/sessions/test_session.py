@@ -73,7 +73,7 @@ def test_all_sides_meet_the_same_push(session: Session) -> None:
     push = session.push(**SMALL, point=[0.0, 0.0, 0.1])
     assert push == Push("torso", 0.1, 0.1, 12.0, 70.0, point=(0.0, 0.0, 0.1))
     tables = [side.env.simulation.push_table for side in session.sides]
-    assert np.array_equal(*tables) and np.count_nonzero(tables[0][:, 2]) == 1
+    assert np.array_equal(*tables) and np.count_nonzero(tables[0]["duration"]) == 1
 
 
 def test_directions_are_those_of_the_start(session: Session) -> None:
@@ -83,7 +83,7 @@ def test_directions_are_those_of_the_start(session: Session) -> None:
     simulation = session.sides[0].env.simulation
     simulation.state_arrays.heading[:] = [0.0, 1.0]  # as if it had turned by 90°
     session.push(**{**SMALL, "direction": 0.0})
-    force = simulation.push_table[0, 3:6]
+    force = simulation.push_table["force"][0]
     assert force @ [np.cos(simulation.start_yaw), np.sin(simulation.start_yaw), 0.0] > 100.0
 
 
