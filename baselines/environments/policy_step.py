@@ -58,8 +58,8 @@ class Residual(Block):
 def capture_error(s: StateArrays, motion: Motion, com_offset: float) -> float:
     """d², d the capture point's distance from that of the reference [m]."""
     nj = motion.samples.shape[1] - 6
-    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega[0]
-    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega[0]
+    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega
+    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega
     cos, sin = s.heading[0], s.heading[1]
     dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
     dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
@@ -193,5 +193,5 @@ def end_tick(step: PolicyStep):
         return
     e.ticks = 0
     copy_into(step.outputs.root_wrench, e.root_wrench)
-    e.metrics.failures = step.outputs.failures[0]
+    e.metrics.failures = step.outputs.failures
     end_step(step.end)

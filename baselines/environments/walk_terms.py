@@ -1,6 +1,6 @@
 """What is known of a walk: its strides as they were, and the terms that tell a policy of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from poise.baselines.balance.stepping.planning.blocks import StepMemory
 from poise.baselines.walking.planner.blocks import Gait
 from poise.baselines.walking.planner.step import step_time
-from poise.envs.balance.mdp.observation import GROUND, Terms, View
+from poise.envs.balance.mdp.observation import Terms, View
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along
@@ -17,6 +17,7 @@ from poise.envs.physics.clock import Clock
 from poise.envs.physics.kinematics import StateArrays
 
 from .terms import STEP_TERMS, StepReport
+from .velocity_terms import VELOCITY_TERMS
 
 
 @dataclass(eq=False)
@@ -114,24 +115,15 @@ class WalkView(Block):
     """The block of a term about walking: what it reads, and the place that it fills."""
 
     seen: View
-    gait: Gait
+    command: np.ndarray  # (8,) see `GaitCommand.array`
     report: WalkReport
 
 
 WALK_TERMS = Terms(STEP_TERMS, WalkView)  #: by name; those of every environment that steps first
-
-
-@WALK_TERMS.add(GROUND, "0.2 ω h", "velocity that is commanded, ahead and to the left", "vector")
-def command_velocity(t: WalkView):
-    seen = t.seen
-    for a in range(2):
-        seen.out[a] = t.gait.command[a] / seen.scales.velocity
-
-
-@WALK_TERMS.add(("z",), "0.2 ω", "turn that is commanded, to the left", "turn")
-def command_turn(t: WalkView):
-    seen = t.seen
-    seen.out[0] = t.gait.command[2] / (0.2 * seen.scales.omega)
+WALK_TERMS |= {  # the same functions of another view
+    name: replace(VELOCITY_TERMS[name], view=WalkView)
+    for name in ("command_velocity", "command_turn")
+}
 
 
 @WALK_TERMS.add(("sin", "cos"), "1", "phase of the step, 0 at its lift-off; 0, 0: none", "number")

@@ -105,7 +105,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         self._strides.clear()
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
-        walk = self.walker.gait, self._walk_report
+        walk = self.walker.gait.command, self._walk_report
         return walk if kind is WalkView else super()._readings(kind)
 
     def _reporter(self) -> WalkReporter:

@@ -93,7 +93,7 @@ def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
     put_middle(t, new, t.stance)
     level = c.memory.level_frame
     outward = t.walk.search.foot_sign[1 - new] * step_width(t)
-    x, y = gait_offset(c.state.omega[0], step_time(g), g.transfer_time, 0.0, 0.0, outward)
+    x, y = gait_offset(c.state.omega, step_time(g), g.transfer_time, 0.0, 0.0, outward)
     x, y = turned(level[0, 0], level[1, 0], x, y)
     x, y = xi[0] - t.stance[0] - x, xi[1] - t.stance[1] - y
     p[0], p[1] = xi[0] + c.gains.gain * x, xi[1] + c.gains.gain * y
@@ -103,7 +103,7 @@ def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
 @compiled
 def transfer_cop(t: WalkTick, p: np.ndarray) -> bool:
     """The CoP on its way to the sole that has landed, into `p`; whether it has arrived."""
-    c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
+    c, g, omega = t.walk, t.gait, t.walk.state.omega
     new, xi = c.memory.foot, c.state.capture_point
     put_middle(t, new, t.stance)
     offset = offset_from(t, 1 - new)
@@ -126,7 +126,7 @@ def limit_loads(t: WalkTick, fraction: float) -> None:
     weight, new = borne_weight(c.robot, c.state), c.memory.foot
     c.on_both.load_limits[new] = weight * (FIRST_LOAD + LOADED * fraction)
     c.on_both.load_limits[1 - new] = weight * max(UNLOADED * (1.0 - fraction), LEAST_LOAD)
-    c.on_both.limited[0] = 1
+    c.on_both.limited = 1
 
 
 @compiled
@@ -137,7 +137,7 @@ def transfer_tick(t: WalkTick) -> bool:
     m.corners = double_support_region(
         t.walk.search.region, feet, level[0, 0], level[1, 0], c.cloud, m.region
     )
-    c.on_both.limited[0] = 0
+    c.on_both.limited = 0
     ready = shift_cop(t, c.vector) if g.starting else transfer_cop(t, c.vector)
     g.clock += c.gains.period
     if not g.starting:
@@ -230,8 +230,8 @@ def may_walk(t: WalkTick) -> bool:
 def count_failures(t: WalkTick) -> None:
     """Count the ticks that no QP could solve."""
     c = t.capture
-    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
-    c.failures[0] = failures + t.walk.on_both.memory.failures[0]
+    failures = c.standing.memory.failures + c.on_both.memory.failures
+    c.failures = failures + t.walk.on_both.memory.failures
 
 
 @compiled

@@ -6,6 +6,7 @@ its numbers, lie one after the other in memory, and only what a function uses is
 """
 
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, fields
 from functools import cache
@@ -35,10 +36,6 @@ from .copies import portable
 from .memory import guarded_zeros
 from .mutable import MutableMember, mutable_dtype
 
-#: kept for `baselines/whole_body`
-Number = Annotated[np.ndarray, 1]
-Integer = Annotated[np.ndarray, 1, np.int64]
-
 
 class Block:
     """Base of dataclasses of arrays, floats, ints, bools and other blocks.
@@ -57,6 +54,8 @@ class Block:
         super().__init_subclass__(**options)
         own = {}
         for name, kind in get_annotations(cls).items():
+            if hasattr(Block, name):
+                raise TypeError(f"{cls.__name__}.{name}: every block has something of this name")
             if (dtype := mutable_dtype(kind)) is not None:
                 own[name] = MutableMember(name, dtype)
                 setattr(cls, name, own[name])
@@ -70,6 +69,8 @@ class Block:
     def __post_init__(self) -> None:
         if self.mutable and type(self).__dataclass_params__.frozen:  # type: ignore[attr-defined]
             raise TypeError(f"{type(self).__name__} has mutable numbers, and is frozen")
+        if self.mutable and sys._getframe(2).f_globals.get("__name__") == "dataclasses":
+            raise TypeError("dataclasses.replace would not share mutable numbers: use .replace")
         words: list[int] = []
         members: list[tuple[str, types.Type, int]] = []
         for name, value in self.named().items():
@@ -88,8 +89,8 @@ class Block:
         """A block of these members, and of zeros for every other mutable number and array.
 
         The shape of such an array is annotated: `Annotated[np.ndarray, "nv+1", 3]` is (nv + 1, 3),
-        of which `sizes` has nv; "6nc" is six times nc. A type at
-        the end is that of the numbers, which are floats by default.
+        of which `sizes` has nv; "6nc" is six times nc. A type at the end is that of the numbers,
+        which are floats by default.
         """
         for name, kind in get_type_hints(cls, include_extras=True).items():
             if name in cls.mutable:
@@ -119,6 +120,13 @@ class Block:
         object.__setattr__(self, name, value)
         self._memory[word] = np.float64(value).view(np.int64)  # type: ignore[attr-defined]
 
+    def replace_block(self, name: str, block: "Block") -> None:
+        """Exchange a block for another one of its type between two calls of compiled code."""
+        kind, word = self.numba_type.members[name]
+        assert kind == block.numba_type, name
+        object.__setattr__(self, name, block)
+        self._memory[word] = block.address  # type: ignore[attr-defined]
+
     def named(self) -> dict[str, Any]:
         """The fields' values by name; for a mutable number the array (1,) that holds it."""
         held = vars(self)
@@ -128,7 +136,7 @@ class Block:
         """The values of `named`, in order."""
         return tuple(self.named().values())
 
-    def numbers(self) -> dict[str, float]:
+    def mutable_values(self) -> dict[str, float]:
         """The values of all mutable numbers by name."""
         return {name: getattr(self, name) for name in self.mutable}
 
@@ -154,7 +162,7 @@ class Block:
         return type(self)(*self.members())
 
 
-def named_entries(kind: type[Block]) -> tuple[np.ndarray, ...]:
+def named_entries(kind: type[Block]) -> tuple[Any, ...]:
     """Members of a block whose first one is an array of zeros, and all others are its entries.
 
     Code that needs a vector takes the array, and code that needs one entry its name.
@@ -174,7 +182,7 @@ def _length(part: int | str, sizes: Mapping[str, int]) -> int:
     return int(found[1] or 1) * sizes[found[2]] + int(found[3] or 0)
 
 
-def _words(value: Any) -> tuple[types.Type, list[int]]:
+def _words(value: Any) -> tuple[Any, list[int]]:
     """Numba's type of a field, and its 64-bit words."""
     if isinstance(value, Block):
         return value.numba_type, [value.address]

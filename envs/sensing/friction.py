@@ -44,7 +44,7 @@ def allocate_friction(robot: Robot) -> SlidingFriction:
 def begin_friction(f: SlidingFriction, s: StateArrays, speed: float) -> None:
     """Start an episode, in which nothing has slid; see `SlidingFriction.speed`."""
     f.speed, f.last, f.measured = speed, 0.0, 0
-    s.friction[0] = 1.0
+    s.friction = 1.0
 
 
 @compiled
@@ -71,8 +71,8 @@ def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings
     if last > 0.0:
         value = 0.5 * PIVOTS * (last + ratio) / f.known
         step = 1.0 if f.measured == 0 else STEP
-        change = min(max(value - s.friction[0], -step), step)
-        s.friction[0] = min(max(s.friction[0] + change, LEAST), 1.0)
+        change = min(max(value - s.friction, -step), step)
+        s.friction = min(max(s.friction + change, LEAST), 1.0)
         f.measured = 1
 
 

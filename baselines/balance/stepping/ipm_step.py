@@ -27,7 +27,7 @@ def rest_distance(speed: float, omega: float, height: float, arc: float) -> floa
 @compiled
 def energy_foothold(q: Search) -> None:
     """The foothold over which the pendulum stands still and its cost, see `IPMStep`."""
-    s, foot, omega, t = q.state, q.foot, q.state.omega[0], q.time
+    s, foot, omega, t = q.state, q.foot, q.state.omega, q.time
     x, vx = pendulum(s.com[0], s.com_vel[0], q.cop[0], omega, t)
     y, vy = pendulum(s.com[1], s.com_vel[1], q.cop[1], omega, t)
     speed = np.sqrt(vx * vx + vy * vy)

@@ -71,7 +71,7 @@ def offset_from(t: WalkTick, swinging: int) -> tuple[float, float]:
     c, g, level = t.walk, t.gait, t.walk.memory.level_frame
     outward = t.walk.search.foot_sign[swinging] * step_width(t)
     x, y = gait_offset(
-        c.state.omega[0], step_time(g), g.transfer_time, g.planned[0], g.planned[1], outward
+        c.state.omega, step_time(g), g.transfer_time, g.planned[0], g.planned[1], outward
     )
     return turned(level[0, 0], level[1, 0], x + c.offsets.com[0], y + c.offsets.com[1])
 
@@ -94,7 +94,7 @@ def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.
     height = min(t.gait.height, np.sqrt(max(length * length - half, 0.0)))
     cos, sin = c.memory.level_frame[0, 0], c.memory.level_frame[1, 0]
     dx, dy = turned(cos, sin, offsets.cop[0], offsets.cop[1])
-    rate = s.omega[0] * s.omega[0]
+    rate = s.omega * s.omega
     own.cop[0], own.cop[1] = p[0] + dx, p[1] + dy
     for a in range(2):
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
@@ -134,7 +134,7 @@ def follow_model(t: WalkTick) -> None:
 @compiled
 def plan_cop(t: WalkTick) -> None:
     """The CoP of the stance sole that brings ξ to the end of a regular step, into `gait.cop`."""
-    c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
+    c, g, omega = t.walk, t.gait, t.walk.state.omega
     foot, level, xi = c.memory.foot, c.memory.level_frame, c.state.capture_point
     stance = c.state.sole_point[1 - foot]
     n = single_support_region(
@@ -158,7 +158,7 @@ def plan_cop(t: WalkTick) -> None:
 def foothold_after(t: WalkTick, time: float) -> float:
     """The foothold for a touchdown after `time` [s], into `search.foothold`; how far limits keep it
     from the one desired [m]."""
-    c, g, q, omega = t.walk, t.gait, t.walk.search, t.walk.state.omega[0]
+    c, g, q, omega = t.walk, t.gait, t.walk.search, t.walk.state.omega
     foot, xi = c.memory.foot, c.state.capture_point
     factor, growth = transfer_factor(omega, g.transfer_time), np.exp(omega * time)
     offset = offset_from(t, 1 - foot)
@@ -229,6 +229,6 @@ def swing_tick(t: WalkTick) -> bool:
     else:
         advance_over(w, apex_of_step(t), c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first
-    contacts.limited[0] = 0
+    contacts.limited = 0
     solve_contacts(c, contacts)
     return True

@@ -2,7 +2,8 @@
 
 import copy
 import pickle
-from dataclasses import FrozenInstanceError, dataclass
+from dataclasses import FrozenInstanceError, dataclass, replace
+from typing import Any
 
 import numba
 import numpy as np
@@ -88,6 +89,11 @@ def test_a_shallow_copy_shares_numbers_as_it_shares_arrays(duplicate) -> None:
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda b: pickle.loads(pickle.dumps(b))])
+def test_a_replacement_that_would_share_nothing_is_refused() -> None:
+    with pytest.raises(TypeError, match="use .replace"):
+        replace(timer(), dt=1.0)
+
+
 def test_blocks_that_share_a_number_share_it_in_their_copies(duplicate) -> None:
     first = timer()
     second = Timer(np.zeros(2), 0.0, first.memory_of("steps"), False, 1.0)
@@ -156,9 +162,16 @@ def test_allocated_numbers_are_zero_and_cleared_ones_too() -> None:
     assert block.dt == 0.5
 
 
+def test_a_member_does_not_hide_a_method() -> None:
+    """A dataclass would take the method for the member's default."""
+    with pytest.raises(TypeError, match=r"Hiding\.replace"):
+        type("Hiding", (Block,), {"__annotations__": {"replace": float}})
+
+
 def test_annotations_may_be_postponed() -> None:
     made = type("Late", (Block,), {"__annotations__": {"steps": "Mutable[int]"}})
-    assert dataclass(eq=False)(made)(3).steps == 3
+    late: Any = dataclass(eq=False)(made)
+    assert late(3).steps == 3
 
 
 def test_a_frozen_block_has_no_mutable_number() -> None:
@@ -170,7 +183,7 @@ def test_a_frozen_block_has_no_mutable_number() -> None:
         Frozen(1.0)
 
 
-@pytest.mark.parametrize("kind", [Mutable[str], "Mutable[str]"])  # type: ignore[type-var]
+@pytest.mark.parametrize("kind", [Mutable[str], "Mutable[str]"])
 def test_other_annotations_are_refused(kind: object) -> None:
     with pytest.raises(TypeError, match="Mutable"):
         type("Wrong", (Block,), {"__annotations__": {"clock": kind}})

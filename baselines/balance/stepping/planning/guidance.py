@@ -118,11 +118,11 @@ def guide_com(
     p[1] += over_y * scale + sin * offsets.cop[0] + cos * offsets.cop[1]
     for a in range(2):
         own.com[a], own.com_vel[a], own.cop[a] = s.com[a], s.com_vel[a], p[a]
-        own.com_acc[a] = s.omega[0] * s.omega[0] * (s.com[a] - p[a])
+        own.com_acc[a] = s.omega * s.omega * (s.com[a] - p[a])
     f = t.search.feedback
     x, y = pivot_offset(f, s, f.swing if t.memory.swinging else f.stance, cos, sin)
-    own.com_acc[0] += s.omega[0] * s.omega[0] * x
-    own.com_acc[1] += s.omega[0] * s.omega[0] * y
+    own.com_acc[0] += s.omega * s.omega * x
+    own.com_acc[1] += s.omega * s.omega * y
     half = 0.25 * (stride_x * stride_x + stride_y * stride_y)
     leg_height = np.sqrt(max(g.leg_length * g.leg_length - half, 0.0))
     own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets.height
@@ -150,7 +150,7 @@ def return_to_motion(t: CaptureTick) -> None:
     if m.recovering:
         m.return_fraction = 0.0
         return
-    m.return_fraction = min(m.return_fraction + RETURN * s.omega[0] * t.gains.period, 1.0)
+    m.return_fraction = min(m.return_fraction + RETURN * s.omega * t.gains.period, 1.0)
     back = m.return_fraction
     own.com[2] += back * (given.com[2] - own.com[2])
     own.com_vel[2], own.com_acc[2] = back * given.com_vel[2], back * given.com_acc[2]
@@ -175,7 +175,7 @@ def limit_posture(t: CaptureTick) -> None:
     acceleration, L̇ = (p − c) × f, which no foothold makes good.
     """
     s, g, own, error = t.state, t.gains, t.reference_out, t.vector
-    p = t.on_both.problem.parameters
+    p = t.on_both.posture
     for j in range(own.q_ref.shape[0]):
         asked = p.stiffness[6 + j] * (own.q_ref[j] - s.qpos[7 + j]) + p.damping[6 + j] * (
             own.v_ref[j] - s.qvel[6 + j]

@@ -38,7 +38,7 @@ def falling(seed):
     """A generic state, its capture point up to 0.4 m away; and a heading near its own."""
     state, rng = generic_state(seed=seed).state.copy(), np.random.default_rng(seed)
     state.arrays.capture_point[:] = state.origin[:2] + rng.uniform(-0.4, 0.4, 2)
-    state.arrays.omega[0] = rng.uniform(3.0, 4.0)
+    state.arrays.omega = rng.uniform(3.0, 4.0)
     return state, state.heading_yaw + rng.uniform(-0.2, 0.2), rng
 
 
