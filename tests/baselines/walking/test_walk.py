@@ -251,3 +251,14 @@ def test_the_miss_is_what_the_cop_leaves():
     time, miss = np.array(misses).T
     before = miss[(time > 1.5) & (time < 3.0)]
     assert miss[time > 3.0].max() > 0.1 > 3.0 * np.median(before)
+
+
+def test_walk_g1_catches_as_walk_off_g1():
+    """All gains of the steps are the same, so that it stands and catches a fall as that does."""
+    one, other = (to_dict(controller_config(name)) for name in ("walk-g1", "walk-off-g1"))
+    own = {"kind", "gait", "uncertain"}
+    assert {k: v for k, v in one.items() if k not in own} == {
+        k: v for k, v in other.items() if k not in own
+    }
+    assert one["gait"]["catch"] > 0.0 and one["gait"]["swing"] == other["swing"]
+    assert one["gait"]["qp"] == other["step_qp"]
