@@ -193,5 +193,5 @@ def end_tick(step: PolicyStep):
         return
     e.ticks = 0
     copy_into(step.outputs.root_wrench, e.root_wrench)
-    e.metrics.failures = step.outputs.failures[0]
+    e.metrics.failures = step.outputs.failures
     end_step(step.end)

@@ -30,6 +30,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.sensing.push_force import forget_pushes, push_force
+from poise.envs.sensing.realism import Realism
 
 from .controlled import ControlledEnv
 from .policy_step import TargetInputs, set_targets
@@ -78,7 +79,7 @@ class ResidualBalanceEnv(ControlledEnv):
     Observation: <observation>
 
     The push is not observed. `observation: {extra: [push_force, push_mean]}` adds the force that
-    is estimated from CoM and CoP, and its leaky mean. The reference is that of `motion`.
+    is estimated from momentum and CoP, and its leaky mean. The reference is that of `motion`.
 
     A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the
     option "command" of `reset` sets it from the start on: a mapping with `ahead`, `left` [m/s] and
@@ -209,6 +210,24 @@ class ResidualBalanceEnv(ControlledEnv):
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
+
+    def stand_in(self, level: Realism) -> str | None:
+        """Return the controller that runs in place of the named one at a level, or None.
+
+        It is the one that the named controller's `uncertain` names. Where it runs in an episode,
+        `info["stand_in"]` names it.
+        """
+        config = getattr(self._known, "config", None)
+        if config is not None and is_replaced(config, level):
+            return str(config.uncertain)
+        return None
+
+    def info(self) -> dict[str, Any]:
+        """The entries of `BalanceEnv`, and the controller that runs in place of the named one."""
+        info = super().info()
+        if self._controller is self._stand_in:
+            info["stand_in"] = self.stand_in(self.realism)
+        return info
 
     def _suit_level(self) -> None:
         """Choose the controller for this realism level, see `where_uncertain`."""

@@ -125,7 +125,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         assert isinstance(controller, CompiledController)  # by `_accept`
         failures = controller.failures
         controller.reset(self.state_source.state)
-        controller.outputs().failures[0] = failures
+        controller.outputs().failures = failures
 
     def check(self) -> None:
         """See `BalanceEnv`; of the controller, and of its new beginning."""

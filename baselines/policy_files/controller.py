@@ -39,7 +39,7 @@ from .terms import Seen, roll_pitch
 
 
 @dataclass(eq=False)
-class Servos(Block):
+class PolicyServos(Block):
     """PD control of all joints (nj)."""
 
     stiffness: np.ndarray  # (nj,) [N·m/rad]
@@ -56,12 +56,12 @@ class PolicyTick(Block):
     """All that a control tick works on."""
 
     state: StateArrays
-    servos: Servos
+    servos: PolicyServos
     ask: CallbackAddress  # calls the policy for new targets
 
 
 @compiled
-def policy_tick(t: PolicyTick):
+def network_tick(t: PolicyTick):
     """τ = K (q* − q) − D q̇ within the limits; q* is new at the first tick of a policy step.
 
     q and q̇ are what the motors' own encoders read: they are not late where the state is.
@@ -116,11 +116,11 @@ class PolicyFile(CompiledController):
         nj = len(self.joints.target)
         limit = np.zeros(nj)
         limit[self.arrays.motor_dofs - 6] = self.arrays.torque_limit
-        self._servos = Servos(
+        self._servos = PolicyServos(
             self.joints.stiffness.copy(), self.joints.damping.copy(), limit,
             self.joints.target.copy(), guarded_zeros(nj), 0, every,
         )  # fmt: skip
-        self._failures, self._no_wrench = guarded_zeros(1, dtype=np.int64), guarded_zeros(6)
+        self._no_wrench = guarded_zeros(6)
         self._callback = Callback(self._ask)
         self._state: RobotState | None = None
         self._tick: PolicyTick | None = None
@@ -229,7 +229,7 @@ class PolicyFile(CompiledController):
         return 2.0 * np.pi * (since / self.config.phase % 1.0)
 
     def tick(self, state: RobotState) -> PolicyTick:
-        """The block that `policy_tick` works on, for `state`."""
+        """The block that `network_tick` works on, for `state`."""
         self._state = state
         known = self._tick
         if known is None or known.state is not state.arrays:
@@ -238,7 +238,7 @@ class PolicyFile(CompiledController):
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next physics step."""
-        policy_tick(self.tick(state))
+        network_tick(self.tick(state))
         self.check()
         return self._servos.tau[self.arrays.motor_dofs - 6]
 
@@ -250,14 +250,14 @@ class PolicyFile(CompiledController):
         self, state: RobotState, targets: Targets
     ) -> tuple[Kernel[PolicyTick], PolicyTick]:
         tick = self.tick(state)
-        return address_of(policy_tick, tick), tick
+        return address_of(network_tick, tick), tick
 
     def outputs(self) -> Outputs:
         s = self._servos
         servos = {"target": s.target, "stiffness": s.stiffness, "damping": s.damping}
-        return Outputs(s.tau, self._no_wrench, self._failures, False, **servos)
+        return Outputs(s.tau, self._no_wrench, 0, False, **servos)
 
-    def gains(self) -> Servos:
+    def gains(self) -> PolicyServos:
         """See `CompiledController`; raises what went wrong in the step before."""
         self.check()
         return self._servos

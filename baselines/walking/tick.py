@@ -58,6 +58,7 @@ def start_walking(t: WalkTick) -> None:
     first = 0 if g.command[1] * t.walk.search.foot_sign[0] > 0.0 else 1
     m.foot, m.recovering, m.corners = 1 - first, 1, 0
     g.walking, g.starting, g.clock, g.step_clock = 1, 1, 0.0, -1.0
+    g.caught = 0
     for a in range(3):
         g.velocity[a] = 0.0
     g.error[0] = g.error[1] = 0.0
@@ -125,7 +126,7 @@ def limit_loads(t: WalkTick, fraction: float) -> None:
     weight, new = borne_weight(c.robot, c.state), c.memory.foot
     c.on_both.load_limits[new] = weight * (FIRST_LOAD + LOADED * fraction)
     c.on_both.load_limits[1 - new] = weight * max(UNLOADED * (1.0 - fraction), LEAST_LOAD)
-    c.on_both.limited[0] = 1
+    c.on_both.limited = 1
 
 
 @compiled
@@ -136,7 +137,7 @@ def transfer_tick(t: WalkTick) -> bool:
     m.corners = double_support_region(
         t.walk.search.region, feet, level[0, 0], level[1, 0], c.cloud, m.region
     )
-    c.on_both.limited[0] = 0
+    c.on_both.limited = 0
     ready = shift_cop(t, c.vector) if g.starting else transfer_cop(t, c.vector)
     g.clock += c.gains.period
     if not g.starting:
@@ -219,11 +220,18 @@ def stop_walking(t: WalkTick) -> None:
 
 
 @compiled
+def may_walk(t: WalkTick) -> bool:
+    """Return whether a walk may begin: after a catch once both soles have been down for a while."""
+    m = t.walk.memory
+    return not m.swinging and (not t.gait.caught or m.clock > t.gait.calm_time)
+
+
+@compiled
 def count_failures(t: WalkTick) -> None:
     """Count the ticks that no QP could solve."""
     c = t.capture
-    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
-    c.failures[0] = failures + t.walk.on_both.memory.failures[0]
+    failures = c.standing.memory.failures + c.on_both.memory.failures
+    c.failures = failures + t.walk.on_both.memory.failures
 
 
 @compiled
@@ -242,8 +250,10 @@ def gait_tick(t: WalkTick) -> bool:
             return False
         if transfer_tick(t):
             lift_off(t)
-    if m.swinging:
-        swing_tick(t)
+    if m.swinging and not swing_tick(t):
+        stop_walking(t)
+        t.gait.caught = 1
+        return False
     return True
 
 
@@ -255,7 +265,7 @@ def walk_tick(t: WalkTick) -> None:
     ξ + k F̂ h/W for ξ it fell more often in side wind.
     """
     g = t.gait
-    if not g.walking and is_commanded(g) and not t.capture.memory.swinging:
+    if not g.walking and is_commanded(g) and may_walk(t):
         start_walking(t)
     if not g.walking or not gait_tick(t):
         capture_tick(t.capture)

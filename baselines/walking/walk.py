@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
-from poise.baselines.balance.stepping.planning.blocks import CaptureTick, Search, StepGains
+from poise.baselines.balance.stepping.planning.blocks import LEG_NUMBERS, SEARCHED, CaptureTick
 from poise.baselines.balance.stepping.planning.config import StepLimits
-from poise.baselines.balance.stepping.planning.swing import Swing
 from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
 from poise.baselines.balance.stepping.planning.swing_task import bind_swings
 from poise.baselines.balance.stepping.planning.units import in_si
@@ -27,7 +27,7 @@ from .controller import Commanded
 from .given import allocate_treads, given_footholds
 from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference, leg_task
-from .planner.arms import allocate_arms
+from .planner.arms import swinging_arms
 from .planner.blocks import Gait, WalkTick
 from .planner.command import ENTRIES, STEP_PARAMETERS, GaitCommand
 from .planner.reach import Reach, check_command, reach_of
@@ -41,16 +41,22 @@ def allocate_gait(
 
     `limits` are what its legs can do of those of `config`; None: no step, no command is one then.
     """
-    numbers = in_si(Gait, config, units)
+    numbers = in_si(
+        config, units, "step_time", "transfer_time", "width", "height", "acceleration",
+        "turn_acceleration", "correction", "correction_limit", "time_price", "transfer_gain",
+        "start_radius", "start_time", "speed_margin", "lower", "catch", "calm_time",
+    )  # fmt: skip
     if limits is None:
         numbers["speed_margin"] = np.inf
     command = guarded_zeros(ENTRIES)
-    parts = {f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)}
+    parts: dict[str, Any] = {
+        f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)
+    }
     return Gait.allocate(
         **numbers,
         command=command,
         **parts,
-        **in_si(Gait, limits or config.limits, units),
+        **in_si(limits or config.limits, units, "time_min"),
         treads=allocate_treads(config.treads, list(surfaces), units),
     )
 
@@ -101,7 +107,7 @@ class Walk(Commanded, CaptureStep):
         self._walk_tick: WalkTick | None = None
         legs = no_legs() if gait.model.keeps_height else leg_arrays(robot)
         self.reference = allocate_reference(robot, gait.qp.period, legs)
-        self.arms = allocate_arms(robot, self.gait_sets.parameters.accel_weight, gait.arm_weight)
+        self.arms = swinging_arms(robot, self.gait_sets.posture.weight, gait.arm_weight)
         super().__init__(robot, config)
 
     @property
@@ -177,12 +183,12 @@ class Walk(Commanded, CaptureStep):
             self._swing.reference, self.memory.level_frame, legs,
         )  # fmt: skip
         swing = capture.swing.replace(
-            **in_si(Swing, gait.swing, units),
+            **in_si(gait.swing, units, "lift", "landing_speed"),
             apex=gait.swing.clearance * units.height,
         )
         return capture.replace(
             swing=swing,
-            gains=capture.gains.replace(**in_si(StepGains, gait, units)),
-            search=capture.search.replace(**in_si(Search, self.gait_limits, units)),
+            gains=capture.gains.replace(**in_si(gait, units, *LEG_NUMBERS)),
+            search=capture.search.replace(**in_si(self.gait_limits, units, *SEARCHED)),
             **ticks,
         )  # fmt: skip

@@ -36,10 +36,6 @@ from .copies import portable
 from .memory import guarded_zeros
 from .mutable import MutableMember, mutable_dtype
 
-#: kept for `baselines/whole_body`
-Number = Annotated[np.ndarray, 1]
-Integer = Annotated[np.ndarray, 1, np.int64]
-
 
 class Block:
     """Base of dataclasses of arrays, floats, ints, bools and other blocks.
@@ -124,6 +120,13 @@ class Block:
         object.__setattr__(self, name, value)
         self._memory[word] = np.float64(value).view(np.int64)  # type: ignore[attr-defined]
 
+    def replace_block(self, name: str, block: "Block") -> None:
+        """Exchange a block for another one of its type between two calls of compiled code."""
+        kind, word = self.numba_type.members[name]
+        assert kind == block.numba_type, name
+        object.__setattr__(self, name, block)
+        self._memory[word] = block.address  # type: ignore[attr-defined]
+
     def named(self) -> dict[str, Any]:
         """The fields' values by name; for a mutable number the array (1,) that holds it."""
         held = vars(self)
@@ -159,7 +162,7 @@ class Block:
         return type(self)(*self.members())
 
 
-def named_entries(kind: type[Block]) -> tuple[np.ndarray, ...]:
+def named_entries(kind: type[Block]) -> tuple[Any, ...]:
     """Members of a block whose first one is an array of zeros, and all others are its entries.
 
     Code that needs a vector takes the array, and code that needs one entry its name.
@@ -179,7 +182,7 @@ def _length(part: int | str, sizes: Mapping[str, int]) -> int:
     return int(found[1] or 1) * sizes[found[2]] + int(found[3] or 0)
 
 
-def _words(value: Any) -> tuple[types.Type, list[int]]:
+def _words(value: Any) -> tuple[Any, list[int]]:
     """Numba's type of a field, and its 64-bit words."""
     if isinstance(value, Block):
         return value.numba_type, [value.address]

@@ -77,7 +77,7 @@ def free_knee(body: Plane, cop: float, step: float = STEP, speed: float = SPEED)
         def beyond(_: float, y: np.ndarray, sign: float = sign) -> float:
             return float(abs(rods(body, y[0], cop)[1][0] - cop) - 0.5 * step)
 
-        beyond.terminal = True  # type: ignore[attr-defined]
+        beyond.terminal = True
         parts.append(solve_ivp(motion, (0.0, sign * 2.0), (start, speed / slope), rtol=1e-8,
                                events=beyond, max_step=0.005))  # fmt: skip
     time = np.concatenate([parts[0].t[:0:-1], parts[1].t])
@@ -113,7 +113,7 @@ def spring(body: Plane, kappa: float = KAPPA, step: float = STEP, speed: float =
     def beyond(_: float, y: np.ndarray) -> float:
         return float(abs(y[0]) - 0.5 * step)
 
-    beyond.terminal = True  # type: ignore[attr-defined]
+    beyond.terminal = True
     parts = [
         solve_ivp(motion, (0.0, sign * 2.0), (0.0, rest * (1.0 - 1.0 / kappa), speed, 0.0),
                   rtol=1e-9, events=beyond, max_step=0.005) for sign in (-1.0, 1.0)

@@ -11,6 +11,8 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
+from .footfalls import COLUMNS as COLUMNS_OF_STEPS
+from .footfalls import landings
 from .footing import Footing
 from .legs import PlantedLegs
 from .splines import evaluate
@@ -60,7 +62,8 @@ class ReferenceMotion(Copyable):
     Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see
     `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation. With
     `commands` (n, 5), whose rows are `WalkCommand`s, it is what trunk and arms do while the
-    robot walks as commanded.
+    robot walks as commanded. `walked` (n, 4) are the footfalls of the clip that is walked so, see
+    `footfalls`.
     """
 
     name: str
@@ -69,6 +72,14 @@ class ReferenceMotion(Copyable):
     loop: bool
     footing: Footing | None = None  # None: both soles stay planted
     commands: np.ndarray | None = None  # None: it does not walk
+    walked: np.ndarray | None = None  # None: not known, or its own soles step
+
+    @property
+    def footfalls(self) -> np.ndarray:
+        """(n, 4) when each foot lands, and where from the other one; see `footfalls`."""
+        if self.footing is not None:
+            return landings(self.footing)
+        return np.empty((0, COLUMNS_OF_STEPS)) if self.walked is None else self.walked
 
     @property
     def duration(self) -> float:
@@ -86,7 +97,9 @@ class ReferenceMotion(Copyable):
         coeffs = self.coeffs * powers[:, None]
         footing = None if self.footing is None else self.footing.at_speed(factor)
         commands = None if self.commands is None else faster(self.commands, factor)
-        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing, commands)
+        walked = None if self.walked is None else self.walked / [factor, 1.0, 1.0, 1.0]
+        knots = self.knots / factor
+        return ReferenceMotion(self.name, knots, coeffs, self.loop, footing, commands, walked)
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""

@@ -22,7 +22,7 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .controller import STANDING, Stepping, SteppingController
-from .planning.blocks import CaptureTick, Search, StepGains, StepMemory
+from .planning.blocks import LEG_NUMBERS, CaptureTick, Search, StepGains, StepMemory
 from .planning.config import CaptureStepConfig, StepLimits
 from .planning.cop_region import CopRegion, cop_region, rest_ahead
 from .planning.feedback import feedback_arrays
@@ -108,7 +108,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         #: (nv−6,) of the last tick [N·m]
         self.tau = guarded_zeros(len(self.qp.parameters.torque_limit))
         self._vdot = guarded_zeros(robot.model.nv)
-        self._failures = guarded_zeros(1, dtype=np.int64)
+        self._failures: Any = guarded_zeros(1, dtype=np.int64)  # of the tick and of the outputs
         self._motors = self.qp.arrays.motor_dofs - 6
         self._reference_out: Targets | None = None
         self._tick: CaptureTick | None = None
@@ -193,7 +193,11 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         if self._reference_out is None:
             self._reference_out = Targets.standing(self.robot, state)
         s, asked, region = state.arrays, self._reference_out.arrays(), self.region
-        numbers = in_si(StepGains, self.config, self.robot.units)
+        numbers = in_si(
+            self.config, self.robot.units, *LEG_NUMBERS, "step_margin", "momentum_gain",
+            "turn_limit", "crouch_margin", "restep_margin", "gain", "cop_overreach",
+            "swing_com_drop", "load_time", "unload_time", "double_support_time",
+        )  # fmt: skip
         if self._step_limits is None:
             numbers["step_margin"] = np.inf  # no fall is a reason for a step
         ticks = bind_swings(

@@ -128,7 +128,7 @@ def limit_load(t: CaptureTick, most: float) -> None:
     """Limit the load of the foot that steps [N]; the other one bears what there is."""
     t.on_both.load_limits[0] = t.on_both.load_limits[1] = np.inf
     t.on_both.load_limits[t.memory.foot] = most
-    t.on_both.limited[0] = 1
+    t.on_both.limited = 1
 
 
 @compiled
@@ -144,7 +144,7 @@ def replan_swing(t: CaptureTick) -> None:
 
 
 @compiled
-def swing_tick(t: CaptureTick) -> None:
+def step_tick(t: CaptureTick) -> None:
     """A tick in a step: first the foot gives its load away, then it swings."""
     s, m, g, w, q = t.state, t.memory, t.gains, t.swing, t.search
     foot, level = m.foot, m.level_frame
@@ -161,7 +161,7 @@ def swing_tick(t: CaptureTick) -> None:
         return
     advance_over(w, w.apex, g.period)
     contacts = t.on_second if foot == 0 else t.on_first
-    contacts.limited[0] = 0
+    contacts.limited = 0
     solve_contacts(t, contacts)
 
 
@@ -178,7 +178,7 @@ def double_support_tick(t: CaptureTick) -> None:
     guide_com(t, m.region[: m.corners], g.cop_overreach, ground, stride_x, stride_y)
     if m.moved:
         return_to_motion(t)
-    t.on_both.limited[0] = 0
+    t.on_both.limited = 0
     if m.clock < g.load_time:
         weight = borne_weight(t.robot, t.state)
         limit_load(t, weight * (FIRST_LOAD + m.clock / g.load_time))
@@ -192,7 +192,7 @@ def standing_tick(t: CaptureTick) -> None:
     call(t.standing_kernel, t.standing)
     copy_into(t.standing.problem.workspace.tau, t.tau)
     copy_into(t.standing.problem.workspace.vdot, t.vdot)
-    t.failures[0] = t.standing.memory.failures[0]
+    t.failures = t.standing.memory.failures
 
 
 @compiled
@@ -220,7 +220,7 @@ def capture_tick(t: CaptureTick) -> None:
         if foot >= 0:
             lower_foot(t, foot)
     if m.swinging:
-        swing_tick(t)
+        step_tick(t)
     else:
         double_support_tick(t)
-    t.failures[0] = t.standing.memory.failures[0] + t.on_both.memory.failures[0]
+    t.failures = t.standing.memory.failures + t.on_both.memory.failures

@@ -58,11 +58,15 @@ def allocate_performance(
     footing: Footing, pace: Pace, config: PerformConfig, units: Units
 ) -> Performance:
     """The performance of a motion by a robot with these units, before it begins."""
+    numbers = in_si(
+        config, units, "gain", "margin", "margin_both", "rest_time", "stance_error", "load_time",
+        "unload_time",
+    )  # fmt: skip
     made = Performance.allocate(
         knots=footing.knots, coeffs=footing.coeffs, switches=footing.switches,
         planted=footing.planted, pace=pace,
-        **in_si(Performance, config, units),
-        **in_si(Performance, config.swing, units),
+        **numbers,
+        **in_si(config.swing, units, "landing_speed"),
     )  # fmt: skip
     made.clear()
     return made

@@ -14,7 +14,7 @@ from .schedule import (
     put_frame,
     reached_region,
     stance_differs,
-    to_world,
+    turn_to_world,
 )
 
 AHEAD = 0.4  # [s] before a lift-off by which the motion must have gone on
@@ -49,7 +49,7 @@ def may_go_on(t: PerformTick, time: float) -> bool:
     if next_switch(t, time) - time < AHEAD or stance_differs(t):
         return False
     put_frame(t)
-    to_world(t)
+    turn_to_world(t)
     return beyond_reach(t, reached_region(t)) <= 0.0
 
 

@@ -100,7 +100,7 @@ def face(t: PerformTick) -> None:
 
 
 @compiled
-def to_world(t: PerformTick) -> None:
+def turn_to_world(t: PerformTick) -> None:
     """Turn CoM and places of `samples` to the world."""
     p = t.performance
     for column in (COM, PLACE[0], PLACE[1], SPIN):
@@ -132,7 +132,7 @@ def stance_differs(t: PerformTick) -> bool:
 
 
 @compiled
-def pendulum_rate(t: PerformTick) -> float:
+def squared_rate(t: PerformTick) -> float:
     """ω² = (g + c̈_z)/(c_z − ground) of the motion [1/s²]; of 0.7 g at least."""
     p = t.performance
     height = p.samples[0, COM + 2] - p.floor
@@ -144,7 +144,7 @@ def pendulum_rate(t: PerformTick) -> float:
 def wanted_cop(t: PerformTick, gain: float, out: np.ndarray) -> None:
     """p_ref + (1 + gain) (ξ − ξ_ref) into `out` (≥ 2,) [m]; p_ref = c − c̈/ω² − δ is the ZMP."""
     s, samples = t.own.state, t.performance.samples
-    rate = pendulum_rate(t)
+    rate = squared_rate(t)
     omega = np.sqrt(rate)
     for a in range(2):
         j = COM + a

@@ -33,12 +33,12 @@ from .schedule import (
     lifted_foot,
     motion_time,
     next_switch,
-    pendulum_rate,
     phase_at,
     put_frame,
     reached_region,
     sample_footing,
-    to_world,
+    squared_rate,
+    turn_to_world,
     wanted_cop,
 )
 
@@ -49,12 +49,12 @@ SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame i
 
 
 @compiled
-def ask_for(t: PerformTick, corners: int) -> None:
+def perform_targets(t: PerformTick, corners: int) -> None:
     """The targets of a tick that performs."""
     c, p, s, own, given = t.own, t.performance, t.own.state, t.own.reference_out, t.given
     wanted_cop(t, p.gain, c.vector)
     find_nearest(c.memory.region[:corners], c.vector, c.pair)
-    rate = pendulum_rate(t)
+    rate = squared_rate(t)
     for a in range(2):
         own.cop[a] = c.pair[a]
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
@@ -71,7 +71,7 @@ def ask_for(t: PerformTick, corners: int) -> None:
 
 
 @compiled
-def limit_loads(t: PerformTick, time: float) -> None:
+def shift_loads(t: PerformTick, time: float) -> None:
     """Let the load go to the foot that has landed, and leave the one that lifts off next."""
     c, p, m = t.own, t.performance, t.own.memory
     weight, limits = c.robot.mass * c.robot.gravity, c.on_both.load_limits
@@ -86,11 +86,11 @@ def limit_loads(t: PerformTick, time: float) -> None:
         if foot >= 0 and not flies(t, phase):
             most = max(UNLOADED * left / p.unload_time, LEAST_LOAD)
             limits[foot] = min(limits[foot], weight * most)
-    c.on_both.limited[0] = 1
+    c.on_both.limited = 1
 
 
 @compiled
-def lift_off(t: PerformTick, foot: int, phase: int) -> None:
+def begin_swing(t: PerformTick, foot: int, phase: int) -> None:
     """Begin the swing of a foot."""
     c, p, m = t.own, t.performance, t.own.memory
     m.steps += 1
@@ -179,16 +179,16 @@ def fly(t: PerformTick, time: float) -> None:
     accel, memory = contacts.problem.workspace.sole_accel, contacts.memory
     for foot in range(2):
         contacts.load_limits[foot] = WEIGHTLESS * c.robot.mass * c.robot.gravity
-    contacts.limited[0] = 1
-    ask_for(t, reached_region(t))
-    share, failures = 1.0, memory.failures[0]
+    contacts.limited = 1
+    perform_targets(t, reached_region(t))
+    share, failures = 1.0, memory.failures
     while True:
         lead_soles(t, time, share)
         solve_contacts(c, contacts)
-        if memory.failures[0] == failures or share < LEAST_SHARE:
+        if memory.failures == failures or share < LEAST_SHARE:
             break
         go_on_from(contacts, memory.torques)
-        memory.failures[0], share = failures, 0.5 * share
+        memory.failures, share = failures, 0.5 * share
     for r in range(accel.shape[0]):
         accel[r] = 0.0
 
@@ -200,7 +200,7 @@ def perform(t: PerformTick, time: float) -> bool:
     phase = phase_at(p.switches, time)
     if m.steps == 0 and next_switch(t, time) - time > SETTLING:
         put_frame(t)
-    to_world(t)
+    turn_to_world(t)
     if m.swinging and has_landed(c):
         m.swinging, m.clock = 0, 0.0
     if in_flight(t, phase, time):
@@ -208,20 +208,20 @@ def perform(t: PerformTick, time: float) -> bool:
         return True
     foot = lifted_foot(t, phase)
     if not m.swinging and foot >= 0 and p.begun != phase and not flies(t, phase):
-        lift_off(t, foot, phase)
+        begin_swing(t, foot, phase)
     face(t)
     corners = reached_region(t)
     if beyond_reach(t, corners) > (p.margin if m.swinging else p.margin_both):
         leave(t)
         return False
-    ask_for(t, corners)
+    perform_targets(t, corners)
     if m.swinging:
         follow_foot(t)
         contacts = c.on_second if m.foot == 0 else c.on_first
-        contacts.limited[0] = 0
+        contacts.limited = 0
     else:
         contacts = c.on_both
-        limit_loads(t, time)
+        shift_loads(t, time)
         m.clock += c.gains.period
     solve_contacts(c, contacts)
     return True
@@ -241,5 +241,5 @@ def perform_tick(t: PerformTick) -> None:
     if not p.performing or not perform(t, time):
         ask_to_rest(t)
         capture_tick(c)
-    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
-    c.failures[0] = failures + t.own.on_both.memory.failures[0]
+    failures = c.standing.memory.failures + c.on_both.memory.failures
+    c.failures = failures + t.own.on_both.memory.failures

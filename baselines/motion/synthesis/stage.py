@@ -139,7 +139,7 @@ def layer_of(clip: Clip, modifiers: tuple[Modifier, ...], script: Script) -> Lay
     return Layer(clip, tuple(groups), weight)
 
 
-def overlaid(base: Clip, layers: list[Layer], at: int, script: Script) -> Clip:
+def overlaid_clip(base: Clip, layers: list[Layer], at: int, script: Script) -> Clip:
     """The base under its layers; an error says where the overlay stands."""
     try:
         return overlay(base, layers)

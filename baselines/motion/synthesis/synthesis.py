@@ -14,7 +14,7 @@ from poise.baselines.motion.graphs.motion_graph import (
     earliest_part,
     latest_part,
 )
-from poise.baselines.motion.graphs.paths import Path, Place, Step, Task
+from poise.baselines.motion.graphs.paths import Path, PathTask, Place, Step
 from poise.baselines.motion.graphs.search import best_paths
 from poise.baselines.motion.retargeting.performed import planned_again
 from poise.baselines.motion.synthesis.scripts.printer import text_of
@@ -80,7 +80,7 @@ class Synthesis:
             "duration": clip.duration,
             "cost": plan.paths[0].cost,
             "made": sorted(self.stage.derived),
-            "played": [asdict(part) for part in parts],
+            "parts": [asdict(part) for part in parts],
             "others": [{"cost": path.cost, "clips": [step.clip for step in path.steps]}
                        for path in plan.paths[1:]],
         }  # fmt: skip
@@ -99,7 +99,7 @@ class Synthesis:
                 continue
             arrows[i], kinds[i] = self._by_hand(actions, i, script), arrow.kind
         ends = [self._places(state, script) for state in (actions.start, actions.goal)]
-        task = Task(actions.names, arrows, *ends)
+        task = PathTask(actions.names, arrows, *ends)
         try:
             paths = self._best_paths(task, k)
         except ConfigError as error:
@@ -143,7 +143,7 @@ class Synthesis:
             raise script.wrong(said, arrow.at, choices)
         return made
 
-    def _best_paths(self, task: Task, k: int) -> list[Path]:
+    def _best_paths(self, task: PathTask, k: int) -> list[Path]:
         """Ways of which every transition can be made; by standing if there is no other one."""
         graph = self.stage.graph
         if self.kind != PHYSICAL:

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from poise.baselines.whole_body.parts.part import Bound
-from poise.baselines.whole_body.tasks.task import Rows, Task, TaskTick
+from poise.baselines.whole_body.tasks.task import Rows, Task, TaskInput, TaskTick
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
@@ -21,7 +21,6 @@ from poise.envs.compiled.maths.easing import eased
 from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.kinematics import StateArrays
-from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .legs import LegArrays
@@ -188,10 +187,10 @@ class LegRows(Task[LegRowsBlock]):
     size: ClassVar[int] = 2
     kernel = staticmethod(fill_leg_rows)
 
-    def rows(self, state: RobotState, block: LegRowsBlock) -> Rows:
+    def rows(self, t: TaskInput, block: LegRowsBlock) -> Rows:
         """The rows in v̇, in NumPy."""
         r, leg = block.reference, block.leg
-        A = np.zeros((2, len(state.qvel)))
+        A = np.zeros((2, len(t.state.qvel)))
         A[0, r.legs.knee_dof[leg]] = r.legs.knee_sign[leg]
         A[1, r.legs.hip_dof[leg]] = r.legs.hip_sign[leg]
         asked = np.array([r.knee[leg], r.hip[leg]])

@@ -43,7 +43,7 @@ def arm_scales(robot: Robot) -> np.ndarray:
     return scales
 
 
-def allocate_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Arms:
+def swinging_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Arms:
     """The arms of a robot; `posture_weight` (nv,) is that of the QP, which `swing_arms` changes,
     and `weight` the one of joints that swing, in 1/ω⁴."""
     scales, swung = arm_scales(robot), posture_weight.copy()
@@ -87,7 +87,7 @@ def feet_apart(t: WalkTick, order: int) -> float:
 def swing_arms(t: WalkTick, period: float) -> None:
     """Add the swing that is commanded to the posture's references; a step takes `period` [s]."""
     arms, own, g = t.arms, t.walk.reference_out, t.gait
-    weight, amplitude = t.walk.on_both.problem.parameters.accel_weight, g.commanded_arm_swing
+    weight, amplitude = t.walk.on_both.posture.weight, g.commanded_arm_swing
     if amplitude <= 0.0:
         if arms.swinging:
             copy_into(arms.free_weight, weight)

@@ -58,6 +58,8 @@ class Gait(Block):
     speed_margin: float  # [m/s]
     time_min: float  # of a step, whatever the command says [s]
     lower: float  # from when a swinging foot comes down [of the swing]; 0: once it is up
+    catch: float  # the miss of ξ from which the walk is given up [m]; 0: never
+    calm_time: float  # on both feet, after which it goes on [s]
     command: np.ndarray  # (8,) see `GaitCommand.array`; those that follow are its entries
     commanded_step_time: Mutable[float]  # [s]; 0 here and below: the gait's own
     commanded_width: Mutable[float]  # [m]
@@ -72,6 +74,8 @@ class Gait(Block):
     starting: Mutable[int]  # 1 until the first foot lifts off
     clock: Mutable[float]  # since both feet are down [s]
     cop: Annotated[np.ndarray, 2]  # that was asked for last on one foot [m]
+    miss: Mutable[float]  # of ξ at touchdown, which that CoP leaves [m]
+    caught: Mutable[int]  # 1 from when the walk was given up until it goes on
     middle: Annotated[np.ndarray, 2]  # between the soles at the last touchdown [m]
     step_clock: Mutable[float]  # since then [s]; < 0: there was none
     treads: Treads

@@ -150,6 +150,8 @@ def plan_cop(t: WalkTick) -> None:
         end = t.stance[a] + touchdown_target(step[a], offset[a], factor, omega, g.transfer_time)
         c.vector[a] = constant_cop(xi[a], end, omega, left)
     find_nearest(c.corners[:n], c.vector, g.cop)
+    dx, dy = c.vector[0] - g.cop[0], c.vector[1] - g.cop[1]
+    g.miss = np.sqrt(dx * dx + dy * dy) * np.expm1(omega * left)
 
 
 @compiled
@@ -207,11 +209,14 @@ def plan_foothold(t: WalkTick) -> None:
 
 
 @compiled
-def swing_tick(t: WalkTick) -> None:
-    """A tick on one foot."""
+def swing_tick(t: WalkTick) -> bool:
+    """A tick on one foot; False instead of torques where ξ misses its place at touchdown by so much
+    that the walk is given up."""
     c, g, w = t.walk, t.gait, t.walk.swing
     foot = c.memory.foot
     plan_cop(t)
+    if g.catch > 0.0 and g.miss > g.catch:
+        return False
     if time_left(w) > FROZEN:
         plan_foothold(t)
     stance = c.state.sole_point[1 - foot]
@@ -224,5 +229,6 @@ def swing_tick(t: WalkTick) -> None:
     else:
         advance_over(w, apex_of_step(t), c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first
-    contacts.limited[0] = 0
+    contacts.limited = 0
     solve_contacts(c, contacts)
+    return True

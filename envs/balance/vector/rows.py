@@ -22,10 +22,11 @@ def in_rows(blocks: Sequence[B]) -> tuple[dict[str, Any], list[B]]:
         if isinstance(first, Block):
             columns[name], parts = in_rows(values)
         else:
-            parts = guarded_zeros((len(blocks), *first.shape), first.dtype.type)
-            for part, value in zip(parts, values, strict=True):
+            array = guarded_zeros((len(blocks), *first.shape), first.dtype.type)
+            for part, value in zip(array, values, strict=True):
                 part[...] = value
-            columns[name] = parts[:, 0] if name in blocks[0].mutable else parts
+            columns[name] = array[:, 0] if name in blocks[0].mutable else array
+            parts = list(array)
         for row, part in zip(rows, parts, strict=True):
             row[name] = part
     return columns, [type(block)(**row) for block, row in zip(blocks, rows, strict=True)]

@@ -14,8 +14,9 @@ from poise.baselines.environments.policy_step import gate_opening
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.whole_body.gains import CoMTask, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP
+from poise.baselines.whole_body.tasks.com import CoM
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import EnvConfig
 from poise.envs.balance.mdp.reward import RewardWeights
@@ -280,7 +281,7 @@ def test_a_soft_root_is_reported():
 def test_failures_of_the_solver_are_counted_per_episode(env):
     """info says how often the QP was not solved since the reset."""
     env.reset(seed=0)
-    env.controller.memory.failures[0] = 3
+    env.controller.memory.failures = 3
     assert env.step(zero(env))[4]["solver_failures"] >= 3
     assert env.reset(seed=0)[1]["solver_failures"] == 0
 
@@ -357,7 +358,7 @@ def test_a_replica_acts_alike(changes):
 
 def test_a_controller_may_be_replaced(env):
     """Its offset, gains and period count from then on, as if the environment were made with it."""
-    config = MomentumQPConfig(com=CoMTask(offset=0.03), period=0.01)
+    config = MomentumQPConfig(com=CoM(offset=0.03), period=0.01)
     env.reset(seed=0)
     env.step(zero(env))
     env.controller = MomentumQP(robot(), config)
@@ -377,7 +378,7 @@ def test_failures_and_the_root_wrench_are_reported(solver):
     config = replace(controller_config("momentum-qp"), root="soft", solver=solver)
     env = ResidualBalanceEnv(robot(), controller=config, pushes=None)
     env.reset(seed=0)
-    env.controller.memory.failures[0] = 3
+    env.controller.memory.failures = 3
     info = env.step(zero(env))[-1]
     assert info["solver_failures"] == 3
     assert np.array_equal(info["root_wrench"], env.controller.root_wrench)

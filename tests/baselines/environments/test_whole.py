@@ -123,7 +123,7 @@ def test_the_controller_takes_back_once_calm():
 
     controller.reset = counted
     env.reset(seed=3, options={"noise": 0.0, "push": {**PUSH, "impulse": 8.0, "direction": 90.0}})
-    controller.outputs().failures[0] = 5
+    controller.outputs().failures = 5
     shares = []
     while env.episode.running:
         env.step_without_info(with_authority(env, 1.0))

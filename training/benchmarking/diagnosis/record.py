@@ -16,7 +16,7 @@ UNSEEN = (PolicyFile, Simbicon)  #: they step without a readable plan
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class TrialCourse:
     """The course of a trial: n rows, one after the reset and one after every policy step."""
 
     time: np.ndarray  #: (n,) [s]
@@ -52,7 +52,7 @@ class CourseRecord:
     """
 
     def __init__(self) -> None:
-        self._rows: list[dict[str, Any]] = []  # of the fields of `Course`
+        self._rows: list[dict[str, Any]] = []  # of the fields of `TrialCourse`
         self._steps: SteppingController | None = None
 
     def __call__(self, env: BalanceEnv) -> None:
@@ -75,9 +75,11 @@ class CourseRecord:
             "failures": float(env.episode.metrics.failures),
         })  # fmt: skip
 
-    def course(self) -> Course:
+    def course(self) -> TrialCourse:
         """Return the record as arrays."""
-        columns = {name: [row[name] for row in self._rows] for name in Course.__dataclass_fields__}
+        columns = {
+            name: [row[name] for row in self._rows] for name in TrialCourse.__dataclass_fields__
+        }
         supports = columns.pop("supports")
         arrays = {name: np.array(column) for name, column in columns.items()}
-        return Course(supports=supports, **arrays)
+        return TrialCourse(supports=supports, **arrays)

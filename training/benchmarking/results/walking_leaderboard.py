@@ -8,7 +8,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.texts import code, plain
 from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.sensing.realism import IDEAL
-from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text, places
+from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text, shared_ranks
 from poise.training.benchmarking.statistics.rates import poisson_interval
 from poise.training.running.columns import (
     COSTS,
@@ -133,7 +133,7 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
     head = ["", "controller", J50_MEAN.heading, J50_PER_MASS.unit, "worst direction",
             "not fallen, pushed", "as commanded again", *(f"kicked {kick}" for kick in kicks),
             "fell unpushed", "falls a minute", "as commanded, unpushed"]  # fmt: skip
-    rank, rows = places(entries, ("j50_mean", ".1f")), []
+    rank, rows = shared_ranks(entries, ("j50_mean", ".1f")), []
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
         fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)

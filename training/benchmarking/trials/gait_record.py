@@ -60,14 +60,14 @@ def knee_motors(env: BalanceEnv) -> list[int | None]:
     return [dofs.index(dof) if dof in dofs else None for dof in known]
 
 
-#: parameter of a command → its measure, see `steps_of`; the `duration` of a step is from touchdown
-#: to touchdown, without T_d
+#: parameter of a command → its measure, see `step_measures`; the `duration` of a step is from
+#: touchdown to touchdown, without T_d
 COMMANDED = {"step_time": "duration", "width": "apart", "clearance": "step_clearance",
              "step_length": "way"}  # fmt: skip
 Commanded = Callable[[float], GaitCommand]  # the command at a time [s]
 
 
-def steps_of(
+def step_measures(
     record: WalkArrays,
     rows: np.ndarray,
     feet: np.ndarray,

@@ -48,7 +48,8 @@ class StepErrors:
         if performance is None or not performance.performing:
             self._resting, self._swung = [None, None], [False, False]
             return
-        x, y, ground, cos, sin = performance.frame
+        p = performance
+        x, y, ground, cos, sin = p.x, p.y, p.floor, p.cos, p.sin
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         sample = self._footing.sample(self._env.motion_time)
         places = sample.places[:, 0] @ turn.T + [x, y, ground]

@@ -91,6 +91,14 @@ class Recentring(Block):
     capture_target: Annotated[np.ndarray, 2]  # where ξ is brought [m]
 
 
+#: of `StepGains` those that the legs' limits give, in a step and in a gait
+LEG_NUMBERS = ("leg_length", "root_accel", "swing_accel", "joint_accel")
+#: of `StepLimits` those that a `Search` has
+SEARCHED = (
+    "ahead", "behind", "width_min", "width_max", "speed", "side_speed", "time_min", "time_max",
+)  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class StepGains(Block):
     """The gains of a `CaptureStepConfig` in SI units."""
@@ -132,7 +140,7 @@ class StepMemory(Block):
     return_fraction: Mutable[float]  # of the way from the stance's posture to the motion's
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class CaptureTick(Block):
     """All that a tick of `CaptureStep` works on."""
 
@@ -152,7 +160,7 @@ class CaptureTick(Block):
     standing: Tick  # QP with feet fixed, before the first step
     tau: np.ndarray  # (nv−6,) torques of the tick [N·m]
     vdot: np.ndarray  # (nv,) accelerations that they are to bring
-    failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
+    failures: Mutable[int]  # ticks since the reset that could not be solved
     corners: Annotated[np.ndarray, "k", 2]  # scratch
     cloud: Annotated[np.ndarray, "n", 2]  # scratch
     pair: Annotated[np.ndarray, 2]  # scratch

@@ -175,7 +175,7 @@ def limit_posture(t: CaptureTick) -> None:
     acceleration, L̇ = (p − c) × f, which no foothold makes good.
     """
     s, g, own, error = t.state, t.gains, t.reference_out, t.vector
-    p = t.on_both.problem.parameters
+    p = t.on_both.posture
     for j in range(own.q_ref.shape[0]):
         asked = p.stiffness[6 + j] * (own.q_ref[j] - s.qpos[7 + j]) + p.damping[6 + j] * (
             own.v_ref[j] - s.qvel[6 + j]

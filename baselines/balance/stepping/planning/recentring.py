@@ -44,8 +44,13 @@ SLIP_TIME, SLIP_SPEED = 0.04, 0.25
 def recentring_arrays(robot: Robot, config: RecentringConfig) -> Recentring:
     """`config` for one robot."""
     feet = nominal_feet(robot)
+    numbers = in_si(
+        config, robot.units, "distance", "calm_speed", "calm_time", "capture_offset",
+        "counterbalance", "arrival_radius", "shift_time_max", "swing_time", "margin",
+        "cop_distance",
+    )  # fmt: skip
     return Recentring.allocate(
-        **in_si(Recentring, config, robot.units),
+        **numbers,
         calm_cosine=float(np.cos(np.radians(config.calm_tilt))),
         nominal=(feet[0] - feet[1])[:2].copy(),
     )

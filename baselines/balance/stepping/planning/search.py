@@ -14,7 +14,7 @@ from poise.envs.compiled.maths.vectors import along, placed
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 
-from .blocks import Search
+from .blocks import SEARCHED, Search
 from .config import FootholdChoice, StepLimits
 from .cop_region import CopRegion, distance_beyond, single_support_region
 from .feedback import (
@@ -229,7 +229,10 @@ def make_search(
     search = Search.allocate(
         {"k": region.alone.shape[1]}, state=state, region=region, offsets=offsets,
         feedback=feedback, foot_sign=foot_signs(robot), height=robot.units.height,
-        **in_si(Search, limits, robot.units), **in_si(Search, choice, robot.units),
+        **in_si(limits, robot.units, *SEARCHED),
+        **in_si(
+            choice, robot.units, "sagittal_offset", "lateral_offset", "margin", "time_price"
+        ),
         arc=float(arc), foothold_rule=NO_KERNEL,
     )  # fmt: skip
     return search.replace(foothold_rule=address_of(rule, search))

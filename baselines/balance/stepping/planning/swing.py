@@ -122,7 +122,7 @@ def advance_high(w: Swing, top: float, lower: float, dt: float) -> None:
 
 def swing_at(point: np.ndarray, duration: float, task: SwingTask, units: Units) -> Swing:
     """The swing of a foot at rest at `point` (3,) [m], of `duration` [s]."""
-    numbers, apex = in_si(Swing, task, units), task.clearance * units.height
+    numbers, apex = in_si(task, units, "lift", "landing_speed"), task.clearance * units.height
     swing = Swing.allocate(**numbers, apex=apex)
     start_swing(swing, np.array(point, dtype=float), float(point[2]), float(duration))
     return swing

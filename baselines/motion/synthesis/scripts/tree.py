@@ -68,7 +68,7 @@ class Modifier:
 
 
 @dataclass(frozen=True)
-class Term:
+class ScriptTerm:
     """A clip, a state or a sequence in brackets, with its modifiers in order."""
 
     body: ClipName | StateName | Sequence
@@ -80,7 +80,7 @@ class Term:
 class Overlay:
     """Terms at once; the first one is the base."""
 
-    terms: tuple[Term, ...]
+    terms: tuple[ScriptTerm, ...]
 
 
 @dataclass(frozen=True)

@@ -226,7 +226,11 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
     moved.com[:], moved.cop[:], moved.height = (0.02, -0.01), (0.01, 0.005), -0.01
     moved.lean[:] = 0.05, 0.08
     added = moved.values
-    monkeypatch.setattr(Offsets, "clear", lambda own: np.copyto(own.values, added))  # by the reset
+
+    def clear(own: Offsets) -> None:
+        own.values[:] = added if own is offsets else 0.0
+
+    monkeypatch.setattr(Offsets, "clear", clear)  # which the reset calls
     watched(controller, 22.0, direction, look, duration=2.5)
     assert set(stages) == (set(range(4)) if name == "feedback-step" else {0})
     assert kinds == {True, False} and np.array_equal(offsets.values, added)

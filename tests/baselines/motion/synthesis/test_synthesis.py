@@ -44,14 +44,14 @@ def make(text: str, **settings) -> tuple[Clip, dict[str, Any]]:
 
 
 def wanted(record: dict[str, Any]) -> list[str]:
-    return [part["what"] for part in record["played"] if part["wanted"]]
+    return [part["what"] for part in record["parts"] if part["wanted"]]
 
 
 def test_clips_are_played_in_order_and_the_record_says_when() -> None:
     """Each part of the whole is the clip that the record names there, but for place and heading."""
     made, record = make("squat -> punch")
     assert wanted(record) == ["humanoid_squat", "humanoid_punch"]
-    played = record["played"]
+    played = record["parts"]
     assert played[0]["begins"] == 0.0 and played[-1]["ends"] == pytest.approx(made.duration)
     for before, after in pairwise(played):
         assert after["begins"] == pytest.approx(before["ends"])
@@ -86,9 +86,9 @@ def test_transitions_by_hand_are_those_of_the_joins() -> None:
         made, record = make(f"squat ->{{{kind}, 0.5}} punch")
         own = JOINS[kind](a, b, 0.5)
         assert np.array_equal(made.rotations, own.rotations)
-        assert [part["what"] for part in record["played"]] == [a.name, kind, b.name]
+        assert [part["what"] for part in record["parts"]] == [a.name, kind, b.name]
     made, record = make("squat ->{insert} punch -> stand", kind="inertial")
-    kinds = [part["what"] for part in record["played"] if part["coefficient"] is not None]
+    kinds = [part["what"] for part in record["parts"] if part["coefficient"] is not None]
     assert kinds[0] == "insert" and set(kinds[1:]) == {"inertial"}
 
 

@@ -39,7 +39,7 @@ def of_row(rings: object, k: int) -> Measurement:
 
 def evaluated(
     agent: Agent, steps: int
-) -> tuple[list[list[Measurement]], list[np.ndarray], Readings]:
+) -> tuple[list[list[Measurement]], list[MotorCommand], Readings]:
     """Measurements before each control tick of a pushed trial, and what motors were asked for."""
     env = agent.env
     observation, _ = env.reset(seed=3, options={"push": PUSH})

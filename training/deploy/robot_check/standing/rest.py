@@ -7,7 +7,7 @@ import numpy as np
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
-from poise.training.benchmarking.trials.play import TINY, lean
+from poise.training.benchmarking.trials.play import TINY, tilt_of
 
 CONTROLLER = "momentum-qp"
 DURATION = 2.0  # [s]
@@ -66,7 +66,7 @@ def stand_at_rest(robot: Robot) -> Rest:
         chatter=float(change[0] / max(change[1], TINY)),
         com_drift=float(drift[0]),
         foot_drift=float(drift[1:].max()),
-        lean=lean(env),
+        lean=tilt_of(env),
         unsolved=int(metrics.failures),
         ticks=int(metrics.ticks),
     )

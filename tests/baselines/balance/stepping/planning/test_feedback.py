@@ -1,5 +1,7 @@
 """The law that feeds the body's lean and turn back to a step."""
 
+from dataclasses import fields
+
 import mujoco
 import numpy as np
 import pytest
@@ -130,12 +132,13 @@ def test_gains_are_linear_between_the_angles_of_falls(angle, expected):
 
 
 def test_each_signal_has_its_index():
-    """The kernels' names of the columns of K are those of the YAML files."""
+    """The kernels' names of signals and changes are those of the YAML files, in their order."""
+    assert tuple(feedback.Signals.mutable) == SIGNALS
+    assert tuple(feedback.Changes.mutable) == tuple(item.name for item in fields(StepFeedback))
+    f = arrays_of(robot(), StepFeedback(), {})
     for k, name in enumerate(SIGNALS):
-        assert getattr(feedback, name.upper()) == k
-    rows = StepFeedback(*(SignalGains(constant=value) for value in (1.0, 2.0, 3.0, 4.0)))
-    for name, value in (("ahead", 1.0), ("outward", 2.0), ("time", 3.0), ("height", 4.0)):
-        assert rows.matrix()[getattr(feedback, name.upper()), feedback.CONSTANT] == value
+        setattr(f.signals, name, 1.0 + k)
+    assert f.signals.values.tolist() == [1.0 + k for k in range(len(SIGNALS))]
 
 
 @pytest.mark.parametrize(
