@@ -41,12 +41,8 @@ from .plugins import PluginConfig, PluginController, plugin_config
 ControllerConfig = (
     MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
     | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | PluginConfig
-<<<<<<< HEAD
-    | CaptureStepConfig | IPMStepConfig | MotionStepConfig | WalkConfig | SimbiconConfig
-    | PolicyFileConfig | GetUpConfig
-=======
     | CaptureStepConfig | IPMStepConfig | WalkConfig | SimbiconConfig | PolicyFileConfig
->>>>>>> 387fc794a9574e613c9a0a37ad71103697bfc279
+    | GetUpConfig
 )  # fmt: skip
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration). Extras add
