@@ -20,7 +20,7 @@ from poise.envs.robots.soles import sole_pose
 from .footfalls import footfalls
 from .footing import check_planted, make_footing, sole_poses
 from .postures import LevelKinematics, most_beyond
-from .reference_motion import START, ReferenceMotion, check_commands, whole_walk
+from .reference_motion import ReferenceMotion, WalkCommand, check_commands, whole_walk
 from .splines import piecewise, rest_spline
 
 RATE = 1.0 / 30.0  # [s] between the postures of the clips that are made here
@@ -173,7 +173,7 @@ def reference_from(
         joints, commands = whole_walk(robot, clip.qpos, dt, commands)
         if clip.planted is not None:
             _, places, turns = sole_poses(robot, clip.qpos)
-            at = commands[1, START] + np.arange(len(clip.qpos)) * dt
+            at = WalkCommand(*commands[1]).start + np.arange(len(clip.qpos)) * dt
             walked = footfalls(at, places, turns, clip.planted)
     elif clip.planted is not None:
         return stepped_reference(

@@ -320,5 +320,5 @@ def test_motors_that_stand_but_hold_no_push_are_warned_of(
     (fault,) = [each for each in weak.faults if each.kind == "pushed"]
     assert f"falls in {len(weak.pushed.falls)} of 8 directions" in fault.text
     console = Console(record=True, width=200)
-    print_check(weak, console)
+    print_robot_check(weak, console)
     assert "pushed, 0.5 of the ankle limit" in console.export_text()
