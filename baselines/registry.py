@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from poise.baselines.balance.in_place.capture_point import CapturePoint, CapturePointConfig
+from poise.baselines.balance.in_place.get_up import GetUp, GetUpConfig
 from poise.baselines.balance.in_place.jacobian_transpose import (
     JacobianTranspose,
     JacobianTransposeConfig,
@@ -41,6 +42,7 @@ ControllerConfig = (
     MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
     | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | PluginConfig
     | CaptureStepConfig | IPMStepConfig | WalkConfig | SimbiconConfig | PolicyFileConfig
+    | GetUpConfig
 )  # fmt: skip
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration). Extras add
@@ -50,6 +52,7 @@ KINDS: dict[str, tuple[type, type]] = {
     "pd": (PDConfig, PD),
     "stable-pd": (StablePDConfig, StablePD),
     "jacobian-transpose": (JacobianTransposeConfig, JacobianTranspose),
+    "get-up": (GetUpConfig, GetUp),
     "kudoh02": (Kudoh02Config, Kudoh02),
     "macchietto09": (Macchietto09Config, Macchietto09),
     "capture-point": (CapturePointConfig, CapturePoint),
