@@ -16,12 +16,11 @@ from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .commanded import check_reach
 from .stepping import ResidualStepEnv
-from .walk_terms import WALK_REPORTED, WALK_TERMS, Strides, WalkReporter, WalkView, report_walk
+from .walk_terms import WALK_TERMS, Strides, WalkReport, WalkReporter, WalkView, report_walk
 
 SPEED_TOLERANCE = 0.036  # [ω h] of the last stride of a walk that goes on as it should
 
@@ -75,7 +74,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         **arguments: Any,
     ):
         self.command_sampler = CommandSampler() if command is None else command_sampler(command)
-        self._walk_report = guarded_zeros(WALK_REPORTED)
+        self._walk_report = WalkReport.allocate()
         self._strides = Strides.allocate()
         super().__init__(robot, config, controller=controller, **arguments)
 
@@ -108,7 +107,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         self._strides.clear()
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
-        walk = self.walker.gait, self._walk_report
+        walk = self.walker.gait.command, self._walk_report
         return walk if kind is WalkView else super()._readings(kind)
 
     def _reporter(self) -> WalkReporter:
@@ -128,7 +127,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         return [*super()._reports(tick), (report_walk, self._reporter())]
 
     def _observe(self) -> None:
-        self._step_report[:] = self.stepper.stepping().entries()
+        self._step_report.fill(self.stepper.stepping())
         report_walk(self._reporter())
         super()._observe()
 
@@ -140,7 +139,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         most = SPEED_TOLERANCE * self.scales.omega * self.scales.height
         strides = self._strides
         close = np.hypot(*strides.error[:2]) <= most
-        return bool(strides.count[0] >= 3 and close and not self.fallen)
+        return bool(strides.count >= 3 and close and not self.fallen)
 
     def info(self) -> dict[str, Any]:
         """The entries of `ResidualStepEnv`, the command and how far the walk is from it."""

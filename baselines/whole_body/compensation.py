@@ -151,7 +151,7 @@ def set_shift(c: Compensation) -> None:
     per_force = c.gain * height / borne_weight(c.robot, s)
     mean, lasting = np.sqrt(push.mean[0] * push.mean[0] + push.mean[1] * push.mean[1]), 0.0
     if mean > 0.0:
-        one_sided = min(mean / push.size[0], 1.0)
+        one_sided = min(mean / push.size, 1.0)
         lasting = c.share[0] * c.reach * min(mean / c.full_at, 1.0) * one_sided / mean
     for a in range(2):
         c.shift[a] = -per_force * push.force[a] - lasting * push.mean[a]

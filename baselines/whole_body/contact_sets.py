@@ -85,14 +85,14 @@ class ContactSets(BoundQP):
         configuration, then `tasks`."""
         chosen = self.sets[soles]
         feet, rows = slice(soles[0], soles[-1] + 1), slice(6 * soles[0], 6 * soles[-1] + 6)
-        own = replace(
-            s, J=s.J[rows], J_v=s.J_v[rows], Jdot_v=s.Jdot_v[rows], sole_point=s.sole_point[feet],
+        own = s.replace(
+            J=s.J[rows], J_v=s.J_v[rows], Jdot_v=s.Jdot_v[rows], sole_point=s.sole_point[feet],
             sole_axes=s.sole_axes[feet], contacts=s.contacts[feet], origin=guarded_zeros(3),
         )  # fmt: skip
         ws = chosen.workspace
         problem = self.new_assembly(chosen.arrays, own, chosen.parameters, targets, ws, s, tasks)
         return ContactTick.allocate(
-            {"nc": len(soles)}, problem=problem, memory=self.memory,
+            {"nc": len(soles)}, problem=problem, memory=self.memory, posture=self.posture,
             applied=self.applied, slew=self.slew, follows=self.follows, chosen=self.chosen,
             index=chosen.index, assemble=address_of(assemble, problem), solve=address_of(solve, ws),
         )  # fmt: skip

@@ -11,14 +11,15 @@ import numpy as np
 from poise.baselines.solvers.dual_active_set import solve_dual
 from poise.baselines.solvers.scaled_rows import INFEASIBLE
 from poise.envs.compiled.block import Block, Integer
-from poise.envs.compiled.calls import Kernel, call
+from poise.envs.compiled.calls import Kernel, call_named
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.kinematics import StateArrays
 
 from .compensation import Compensation, compensate
 from .parameters import QPParameters
-from .reduced_qp import Assembly, recover
+from .reduced_qp import Assembly, assemble, recover
+from .tasks.posture import PostureBlock
 from .workspace import Workspace
 
 MAX_ITERATIONS = 200
@@ -105,8 +106,8 @@ def momentum_tick(t: Tick):
     a = t.problem
     if t.compensation.active:
         compensate(t.compensation)
-    call(t.assemble, a)
-    call(t.solve, a.workspace)
+    call_named(assemble, t.assemble, a)
+    call_named(solve, t.solve, a.workspace)
     accept(a.state, a.parameters, a.workspace, t.memory)
 
 
@@ -116,6 +117,7 @@ class ContactTick(Block):
 
     problem: Assembly  # of a state whose arrays of soles are views: these soles only
     memory: Memory
+    posture: PostureBlock  # gains of the task `posture`; zero without one
     load_limits: Annotated[np.ndarray, "nc"]  # [N]
     limited: Integer  # 1 where these limits count
     applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
@@ -155,7 +157,7 @@ def assemble_contacts(t: ContactTick):
     ws, cone = t.problem.workspace, t.problem.parameters.cone
     choose_set(t)
     update_origin(t.problem.state)
-    call(t.assemble, t.problem)
+    call_named(assemble, t.assemble, t.problem)
     if t.limited[0]:
         for i in range(cone.shape[0]):
             row = (i + 1) * cone.shape[1] - 1
@@ -178,13 +180,13 @@ def bound_torques(t: ContactTick, rate_limited: bool):
 
 
 @compiled
-def solve_contacts(t: ContactTick):
+def solve_subset(t: ContactTick):
     """Torques from the assembled problem, none of which changes by more than `slew`."""
     ws = t.problem.workspace
-    call(t.solve, ws)
+    call_named(solve, t.solve, ws)
     if ws.status[0] != 0 and t.follows[0]:
         bound_torques(t, False)
-        call(t.solve, ws)
+        call_named(solve, t.solve, ws)
     accept(t.problem.state, t.problem.parameters, ws, t.memory)
     for a in range(ws.tau.shape[0]):
         if t.follows[0]:
@@ -197,7 +199,7 @@ def solve_contacts(t: ContactTick):
 def contact_tick(t: ContactTick):
     """Run one tick with a subset: its workspace's `tau` (nv−6,) then holds torques."""
     assemble_contacts(t)
-    solve_contacts(t)
+    solve_subset(t)
 
 
 @compiled

@@ -15,8 +15,9 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.envs.compiled.block import Block, Integer, Number
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays, borne_weight
 
@@ -25,7 +26,7 @@ MEMORY = 20.0  # [1/ω] T of its mean, unless a controller has its own
 SUPPORTED = 0.1  # [m g] of the ground's force, below which there is no CoP to go by
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class PushForce(Block):
     """The estimated force, world axes, and the mean of it over the last seconds."""
 
@@ -33,10 +34,10 @@ class PushForce(Block):
     memory: float  # T of the leaky mean [s]
     force: Annotated[np.ndarray, 2]  # F̂ [N]
     mean: Annotated[np.ndarray, 2]  # F̄ [N]
-    size: Number  # the leaky mean of |F̂| [N]
+    size: Mutable[float]  # the leaky mean of |F̂| [N]
     com_vel: Annotated[np.ndarray, 2]  # of the last tick [m/s]
     turning: Annotated[np.ndarray, 2]  # L_x, L_y of the last tick [N·m·s]
-    begun: Integer  # 1 once there was a tick
+    begun: Mutable[int]  # 1 once there was a tick
 
 
 def push_force(omega: float, smoothing: float = SMOOTHING, memory: float = MEMORY) -> PushForce:
@@ -46,8 +47,8 @@ def push_force(omega: float, smoothing: float = SMOOTHING, memory: float = MEMOR
 
 def forget_pushes(b: PushForce) -> None:
     """Start an episode, in which nothing has pushed yet."""
-    for array in (b.force, b.mean, b.size, b.begun):
-        array[:] = 0
+    b.force[:], b.mean[:] = 0.0, 0.0
+    b.size, b.begun = 0.0, 0
 
 
 @compiled
@@ -59,7 +60,7 @@ def observe_push(b: PushForce, robot: RobotArrays, s: StateArrays, dt: float) ->
     Without support there is no CoP, and both stay as they are.
     """
     weight = borne_weight(robot, s)
-    if b.begun[0] and s.contact_wrench[2] > SUPPORTED * weight:
+    if b.begun and s.contact_wrench[2] > SUPPORTED * weight:
         height = max(s.com[2] - s.origin[2], 0.2 * robot.height_com)
         stiffness = s.contact_wrench[2] / height
         rate, leak = dt / (b.smoothing + dt), dt / (b.memory + dt)
@@ -71,8 +72,8 @@ def observe_push(b: PushForce, robot: RobotArrays, s: StateArrays, dt: float) ->
             b.force[a] += rate * (force - b.force[a])
             b.mean[a] += leak * (b.force[a] - b.mean[a])
         size = np.sqrt(b.force[0] * b.force[0] + b.force[1] * b.force[1])
-        b.size[0] += leak * (size - b.size[0])
+        b.size += leak * (size - b.size)
     for a in range(2):
         b.com_vel[a] = s.com_vel[a]
         b.turning[a] = s.momentum[3 + a]
-    b.begun[0] = 1
+    b.begun = 1

@@ -163,7 +163,7 @@ def reference_from(
         ConfigError: postures of another robot, or such as can only be seen; a joint out of its
             range, or soles that leave their plane by 2 cm though they are planted.
     """
-    check_robot(clip, robot, source)
+    check_clip_robot(clip, robot, source)
     if clip.about.unperformed:
         raise ConfigError(f"can be seen, but not performed: {clip.about.unperformed}",
                           source=source, field="motion")  # fmt: skip
@@ -188,7 +188,7 @@ def reference_from(
     return ReferenceMotion(clip.about.name, knots, coeffs, loop=False, commands=commands)
 
 
-def check_robot(clip: RobotClip, robot: Robot, source: str) -> None:
+def check_clip_robot(clip: RobotClip, robot: Robot, source: str) -> None:
     """Raise ConfigError unless the postures are of this robot."""
     if clip.about.fingerprint != robot.fingerprint:
         raise ConfigError(

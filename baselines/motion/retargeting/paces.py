@@ -35,7 +35,7 @@ BEFORE, AFTER = STANDING, 1.6  # [s] of standing before the first and after the 
 TURN = 300.0  # [°] that a motion may turn: rotation vectors of a whole turn have no axis
 
 
-class Pace(NamedTuple):
+class ClipStep(NamedTuple):
     """A step: foot (0 left, 1 right), lift-off and touchdown [s], the end of the stance after it
     [s], and how high the foot gets [m], in the clip's sizes; with no end it steps beside the
     other."""
@@ -46,13 +46,13 @@ class Pace(NamedTuple):
     end: float | None
     apex: float
 
-    def at_speed(self, factor: float) -> Pace:
+    def at_speed(self, factor: float) -> ClipStep:
         """The step `factor` > 0 times as fast."""
         end = None if self.end is None else self.end / factor
         return self._replace(lift=self.lift / factor, land=self.land / factor, end=end)
 
 
-def find_paces(clip: Clip) -> list[Pace]:
+def find_paces(clip: Clip) -> list[ClipStep]:
     """The steps of a clip, in order.
 
     A foot lands when its heel or toe begins to rest, and lifts off when both have begun to move,
@@ -82,19 +82,19 @@ def find_paces(clip: Clip) -> list[Pace]:
                 continue
             left = stances[k - 1][1] if k else max(a - round(SWING / clip.dt), 0)
             apex = float(heights[left : a + 1].max()) - low
-            found.append(Pace(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
+            found.append(ClipStep(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
     found.sort(key=lambda pace: pace.land)
     if not found:
         raise ConfigError("its feet move, but take no step", source=clip.name, field="feet")
     return _in_turn(found)
 
 
-def _in_turn(found: list[Pace]) -> list[Pace]:
+def _in_turn(found: list[ClipStep]) -> list[ClipStep]:
     """Steps one after the other, and a last one that puts the foot behind beside the other one."""
     period = float(np.median(np.diff([pace.land for pace in found]))) if len(found) > 2 else 0.6
     last = found[-1]
     end = last.land + max(period, SWING + BOTH)
-    paces = [*found, Pace(1 - last.foot, last.land, end, None, last.apex)]
+    paces = [*found, ClipStep(1 - last.foot, last.land, end, None, last.apex)]
     made, before = [], -np.inf
     for pace in paces:
         lift = max(pace.lift - EARLY, before + BOTH)
@@ -106,7 +106,7 @@ def _in_turn(found: list[Pace]) -> list[Pace]:
 
 
 def plan_paces(
-    paces: list[Pace], tracks: Tracks, qpos: np.ndarray, robot: Robot, lead: int, scale: float,
+    paces: list[ClipStep], tracks: Tracks, qpos: np.ndarray, robot: Robot, lead: int, scale: float,
     low: float,
 ) -> FootPlan:  # fmt: skip
     """The plan of a clip's steps for a robot.
@@ -152,7 +152,7 @@ def plan_paces(
 
 
 def _goals(
-    paces: list[Pace], tracks: Tracks, nominal: np.ndarray, left: int
+    paces: list[ClipStep], tracks: Tracks, nominal: np.ndarray, left: int
 ) -> list[tuple[np.ndarray, float]]:
     """Where each step lands: the sole's point (3,) on the ground [m], and its heading [rad].
 
@@ -198,7 +198,7 @@ def calm_joints(robot: Robot, qpos: np.ndarray, lead: int, begin: int, frames: i
     return led(calm, standing, standing, lead, begin, frames)
 
 
-def frames_before(paces: list[Pace], lead: int) -> int:
+def frames_before(paces: list[ClipStep], lead: int) -> int:
     """How many frames of standing a clip has before it, `lead` of them at least."""
     return max(round((BEFORE - paces[0].lift) / RATE), lead)
 

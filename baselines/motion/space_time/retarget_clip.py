@@ -200,7 +200,7 @@ def performable(
     from .asked import Asked  # mink is there: `retarget_to` has used it
     from .grid import by_trial
     from .problem import Problem, optimise
-    from .quality import measure
+    from .quality import motion_quality
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted, made.clip.dt)
     if steps:
@@ -217,7 +217,7 @@ def performable(
     if chosen != "frame":
         spent = (time.thread_time() - begun) / len(scene)
     done = replace(made.clip, qpos=scene.qpos)
-    quality = measure(scene, asked, wanted)
+    quality = motion_quality(scene, asked, wanted)
     return RetargetedClip(done, quality, chosen, made.scale, spent, begins=made.begins)
 
 

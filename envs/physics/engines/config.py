@@ -27,14 +27,22 @@ class Physics:
     Attributes:
         engine: What steps the robot.
         substeps: Steps of the engine in a physics step, in which torques and pushes are constant.
+        contact: Drake's approximation of compliant contact. `lagged` bounds friction by the normal
+            force at the start of a step; `sap` lifts points that slide.
         sink: Depth to which the robot's weight presses a single point of contact [m]; it sets the
             stiffness of a point.
-        relaxation: Time constant of the dissipation of contacts [s].
+        dissipation: Hunt and Crossley's, of `lagged`: the force k x of a point at depth x is
+            k x (1 + dissipation ẋ) [s/m].
+        slip: Speed below which friction of `lagged` is viscous [m/s].
+        relaxation: Time constant of the dissipation of `sap` [s].
     """
 
     engine: Literal["mujoco", "drake"] = MUJOCO
     substeps: int = field(default=1, metadata={"min": 1, "max": 100})
-    sink: float = field(default=1.25e-3, metadata={"above": 0.0, "max": 0.1})
+    contact: Literal["lagged", "sap"] = "lagged"
+    sink: float = field(default=4e-3, metadata={"above": 0.0, "max": 0.1})
+    dissipation: float = field(default=5.0, metadata={"min": 0.0, "max": 1e3})
+    slip: float = field(default=1e-4, metadata={"above": 0.0, "max": 0.1})
     relaxation: float = field(default=0.01, metadata={"min": 0.0, "max": 1.0})
 
     def __post_init__(self) -> None:

@@ -42,7 +42,7 @@ from poise.envs.robots.ground import pair_friction
 from poise.envs.robots.robot import Robot
 
 from .config import Physics
-from .geometry import GEOM, ground_points, mesh_vertices, rotation, touching_pairs
+from .geometry import GEOM, ground_points, mesh_vertices, rotation_of, touching_pairs
 
 POINT = 1e-6  # [m] radius of a ball that stands for a corner
 SLIPPERY, ROUGH = 1e-9, 1e9  # friction: Drake takes the harmonic mean, 2 μ₁ μ₂/(μ₁ + μ₂)
@@ -67,10 +67,12 @@ class DrakePlant:
         self.robot, model = robot, robot.model
         self._stiffness = 2.0 * robot.mass * robot.units.gravity / physics.sink
         self._relaxation, self._softer = physics.relaxation, softer
+        self._dissipation = float(physics.dissipation)
         builder = DiagramBuilder()
         config = MultibodyPlantConfig()
         config.time_step = float(model.opt.timestep) / physics.substeps
-        config.discrete_contact_approximation = "sap"
+        config.discrete_contact_approximation = physics.contact
+        config.stiction_tolerance = physics.slip
         config.contact_model = "point"
         config.use_sampled_output_ports = False  # forces of the step that begins, not of the last
         config.adjacent_bodies_collision_filters = False  # the pairs are MuJoCo's
@@ -152,7 +154,7 @@ class DrakePlant:
         model = self.robot.model
         if model.body_mass[body] == 0.0:
             return SpatialInertia.Zero()
-        axes = rotation(model.body_iquat[body])
+        axes = rotation_of(model.body_iquat[body])
         own = axes @ np.diag(model.body_inertia[body]) @ axes.T
         moments = RotationalInertia(*own[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
         try:
@@ -194,8 +196,8 @@ class DrakePlant:
     def _material(self, friction: float, geom: int | None) -> ProximityProperties:
         """The material of a geom, or of the ground: None.
 
-        The stiffness of a contact is k₁ k₂/(k₁ + k₂), its relaxation time τ₁ + τ₂: the ground has
-        none, two geoms have both.
+        The stiffness of a contact is k₁ k₂/(k₁ + k₂), its dissipation (d₁ k₂ + d₂ k₁)/(k₁ + k₂),
+        its relaxation time τ₁ + τ₂: the ground has none, two geoms have both.
         """
         stiffness = self._stiffness / (1.0 if geom is None else self._softer[geom] ** 2)
         properties = ProximityProperties()
@@ -203,6 +205,7 @@ class DrakePlant:
         properties.AddProperty("material", "point_contact_stiffness", stiffness)
         relaxation = 0.0 if geom is None else self._relaxation
         properties.AddProperty("material", "relaxation_time", relaxation)
+        properties.AddProperty("material", "hunt_crossley_dissipation", self._dissipation)
         return properties
 
     def _filter(self) -> None:
@@ -234,7 +237,7 @@ class DrakePlant:
         return q
 
     def _velocities(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
-        return self.to_drake(rotation(qpos[3:7]), qvel)
+        return self.to_drake(rotation_of(qpos[3:7]), qvel)
 
     def to_drake(self, root_axes: np.ndarray, vector: np.ndarray) -> np.ndarray:
         """Velocities, or generalised forces, (nv,) in Drake's order and axes of the root."""
@@ -259,7 +262,7 @@ class DrakePlant:
         mujoco.mju_normalize4(qpos[3:7])
         qpos[7:] = q[self.qpos] + self._reference
         n = self._root_v
-        qvel[:3], qvel[3:6] = v[n + 3 : n + 6], rotation(qpos[3:7]).T @ v[n : n + 3]
+        qvel[:3], qvel[3:6] = v[n + 3 : n + 6], rotation_of(qpos[3:7]).T @ v[n : n + 3]
         qvel[6:] = v[self.qvel]
 
     def contacts(self) -> tuple[np.ndarray, list[int]]:
@@ -291,7 +294,7 @@ def _silenced(logger: str) -> Iterator[None]:
 
 
 def _transform(position: np.ndarray, quaternion: np.ndarray) -> RigidTransform:
-    return RigidTransform(RotationMatrix(rotation(quaternion)), np.array(position))
+    return RigidTransform(RotationMatrix(rotation_of(quaternion)), np.array(position))
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> Any:

@@ -149,7 +149,7 @@ def test_it_is_recovered_while_it_follows():
     env = VelocityEnv(robot(), pushes=None, duration=2.0)
     for ahead, well in ((0.0, True), (0.09, True), (0.5, False)):
         env.reset(seed=0, options={"command": {"ahead": ahead}})
-        while env.episode.running[0]:
+        while env.episode.running:
             env.step_without_info(np.zeros(env.action_space.shape))
         assert env.recovered == well, ahead
 

@@ -11,6 +11,7 @@ from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.errors import ConfigError
 from poise.envs.sensing.realism import load_realism
+from tests.support.refused import refused
 from tests.support.shared import robot
 
 FAST = {"ahead": 0.4}
@@ -101,7 +102,7 @@ def test_commands_need_a_controller_that_walks():
     with pytest.raises(ConfigError, match="reset: command: unknown option"):
         torques.reset(options={"command": FAST})
     walking = ResidualBalanceEnv(robot(), controller="walk", pushes=None, duration=0.1)
-    with pytest.raises(ConfigError, match="command: speed: unknown field"):
+    with refused("unknown field", "speed", source="command"):
         walking.command = {"speed": 1.0}
 
 
@@ -199,9 +200,13 @@ def test_where_state_and_robot_are_uncertain_another_one_walks():
     env = ResidualBalanceEnv(robot(), controller="walk", **SHORT)
     field = ResidualBalanceEnv(robot(), controller="walk-field", realism="field", **SHORT)
 
+    mine = load_controller("walk-fast", robot())
+
     def end(env, level):
         env.realism = load_realism(level)
-        env.reset(seed=4, options={"command": FAST})
+        _, info = env.reset(seed=4, options={"command": FAST})
+        replaced = env is not field and level == "field" and env.controller is not mine
+        assert info.get("stand_in") == ("walk-field" if replaced else None)
         play(env, 1.0)
         return env.simulation.data.qpos.copy()
 
@@ -212,6 +217,6 @@ def test_where_state_and_robot_are_uncertain_another_one_walks():
     np.testing.assert_array_equal(end(env, "ideal"), itself)
     np.testing.assert_array_equal(end(env, "late"), late)
     assert np.abs(itself - late).max() > 1e-6 and np.abs(end(field, "ideal") - itself).max() > 1e-3
-    mine = env.controller = load_controller("walk-fast", robot())
+    env.controller = mine
     end(env, "field")
     assert env.controller is mine

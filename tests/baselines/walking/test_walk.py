@@ -126,7 +126,7 @@ def test_step_time_and_width_are_commanded():
         (2.0, GaitCommand(**still)), (4.0, GaitCommand(**still, step_time=0.45, width=0.28))
     )
     gait, state = env.controller.gait, env.simulation.state
-    assert not env.fallen and env.controller._swing.duration[0] == pytest.approx(0.45, abs=0.05)
+    assert not env.fallen and env.controller._swing.duration == pytest.approx(0.45, abs=0.05)
     across = np.array([-state.heading[1], state.heading[0]])
     feet = state.sole_points[:, :2]
     assert abs((feet[0] - feet[1]) @ across) == pytest.approx(0.28, abs=0.04)
@@ -134,7 +134,7 @@ def test_step_time_and_width_are_commanded():
     env.controller.command = GaitCommand(0.2)
     for _ in range(150):
         env.step(np.zeros(len(env.action_names)))
-    assert env.controller._swing.duration[0] == pytest.approx(gait.step_time, abs=0.05)
+    assert env.controller._swing.duration == pytest.approx(gait.step_time, abs=0.05)
 
 
 def test_a_step_time_of_a_command_is_above_zero():
@@ -180,7 +180,7 @@ def test_a_step_is_not_commanded_to_be_quicker_than_the_legs():
     _, _, env = walk((2.0, GaitCommand(0.2, step_time=0.05)))
     gait = env.controller.gait
     assert not env.fallen
-    assert env.controller._swing.duration[0] >= gait.time_min - 1e-9
+    assert env.controller._swing.duration >= gait.time_min - 1e-9
 
 
 def test_legs_that_would_land_too_late_do_not_walk():

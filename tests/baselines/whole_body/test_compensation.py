@@ -95,7 +95,7 @@ def test_the_target_stays_within_the_support(angle):
 def test_the_lean_is_released_while_the_capture_point_is_away():
     """λ is 0 where ξ is not where it is to be, and comes back with its time constant."""
     _, c, targets = block()
-    c.push.mean[1], c.push.size[0] = 10.0, 10.0
+    c.push.mean[1], c.push.size = 10.0, 10.0
     compensate(c)
     leaning = c.shift[1]
     assert leaning < -0.03
@@ -105,7 +105,7 @@ def test_the_lean_is_released_while_the_capture_point_is_away():
     c.state.capture_point[:] = targets.com[:2]
     ticks = round(c.return_time / c.period)
     for _ in range(ticks):
-        c.push.mean[1], c.push.size[0] = 10.0, 10.0
+        c.push.mean[1], c.push.size = 10.0, 10.0
         c.state.capture_point[:] = targets.com[:2] + c.shift
         compensate(c)
     assert 0.55 < c.share[0] < 0.7  # 1 − 1/e

@@ -17,7 +17,7 @@ from .standing.rest import CONTROLLER, Rest
 EVERY = 2  # of the directions, in the table
 
 
-def print_check(check: RobotCheck, console: Console) -> None:
+def print_robot_check(check: RobotCheck, console: Console) -> None:
     """The robot, its directions, who can use it, what will go wrong."""
     console.print(fact_table(check.name, _rows(check)))
     console.print(_directions(check))

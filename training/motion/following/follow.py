@@ -9,24 +9,27 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.reference_motion import AHEAD, START, TURN, ReferenceMotion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion, WalkCommand
 from poise.baselines.balance.references.tempo import Tempo
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import FallLimits
+from poise.envs.physics.engines.config import load_physics
+from poise.envs.physics.engines.engine import check_engine
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, follows_no_motion, load_agent
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
 from poise.training.benchmarking.trials.play import Watch, run_trial
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.motion.tracking.record import ANYWHERE, TrackingFigures
+from poise.training.motion.tracking.record import TrackingFigures
 
 PUSH_TIME = 0.1  # [s]
-LONGEST = 600.0  # [s]
 LITTLE = 0.2  # [m, rad]
 LEAN = 30.0  # [deg] beyond the motion's own largest tilt
 FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion itself goes low
@@ -60,6 +63,7 @@ def follow(
     watch: Callable[[Trial], Watch | None] | None = None,
     patient: bool = True,
     realism: str | Path | None = None,
+    physics: str | Path | None = None,
 ) -> list[Followed]:
     """Let a controller perform a motion from `starts` disturbed starts.
 
@@ -73,28 +77,31 @@ def follow(
 
     The motion runs `speed` times as fast, and waits as `tempo` defines. `watch(trial)` returns
     what is called with the environment after the reset and after every step. Without
-    `patient` the first fall ends the trials. `realism` is a level, by name or file.
+    `patient` the first fall ends the trials. `realism` is a level, by name or file;
+    `physics` the engine, by name or file.
 
     Raises:
-        ConfigError: no such motion, controller or robot, one that does not play motions, counts
-            below 1, an impulse, a share or a seed below 0, an impulse and a share, a share without
-            measured limits, a speed that is not from 0.1 to 10.
+        ConfigError: no such motion, controller, robot or engine, a robot that the engine does not
+            hold, a controller that does not play motions, counts below 1, an impulse, a share or a
+            seed below 0, an impulse and a share, a share without measured limits, a speed that is
+            not from 0.1 to 10.
     """
     if not 0.1 <= speed <= 10.0:
-        raise ConfigError(f"must be from 0.1 to 10, not {speed:g}", field="tempo")
+        raise out_of_range(speed, field="tempo", least=0.1, most=10, form="g")
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
     whole_number(seed, 0, "seed")
     for name, size in (("impulse", impulse), ("share", share)):
         if not 0.0 <= size < np.inf:
-            raise ConfigError(f"must be at least 0, not {size:g}", field=name)
+            raise out_of_range(size, field=name, least=0, form="g")
     if impulse and share:
         raise ConfigError("give either an impulse or a share of J50", field="share")
     body = robot if isinstance(robot, Robot) else load_robot(robot)
+    check_engine(load_physics(physics), body)
     half = load_limits(body).j50() if share else None
     reference = load_motion(motion, body)
     reference = reference if speed == 1.0 else reference.at_speed(speed)
-    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo, realism)
+    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo, realism, physics)
     rng = np.random.default_rng(seed)
     trials = []
     for k in range(starts):
@@ -104,7 +111,7 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        course = Course(reference.commands, None if watch is None else watch(trial))
+        course = FollowedWalk(reference.commands, None if watch is None else watch(trial))
         followed = _followed(run_trial(agent, trial, course), trial)
         walked, turned = course.shares()
         trials.append(replace(followed, walked=walked, turned=turned))
@@ -113,7 +120,7 @@ def follow(
     return trials
 
 
-class Course:
+class FollowedWalk:
     """Path of a robot while a walk is commanded: a `Watch` that also calls another."""
 
     def __init__(self, commands: np.ndarray | None, other: Watch | None = None):
@@ -122,7 +129,8 @@ class Course:
 
     def __call__(self, env: BalanceEnv) -> object:
         commands, time = self._commands, env.simulation.time
-        if commands is not None and commands[1, START] <= time <= commands[-1, START]:
+        starts = None if commands is None else np.asarray(WalkCommand(*commands.T).start)
+        if starts is not None and starts[1] <= time <= starts[-1]:
             state = env.simulation.state
             heading = np.arctan2(state.heading[1], state.heading[0])
             self._gone.append((*state.com[:2], heading))
@@ -136,7 +144,8 @@ class Course:
         yaw = np.unwrap(gone[:, 2])
         axes = np.column_stack([np.cos(yaw), np.sin(yaw)])[1:]
         way = float((np.diff(gone[:, :2], axis=0) * axes).sum())
-        asked = np.diff(commands[:, START]) @ commands[:-1, [AHEAD, TURN]]
+        start, ahead, _, turn, _ = WalkCommand(*commands.T)
+        asked = np.diff(start) @ np.stack([ahead, turn], axis=1)[:-1]
         done = np.array([way, yaw[-1] - yaw[0]])
         shares = np.where(np.abs(asked) > LITTLE, done / np.where(asked == 0.0, 1.0, asked), np.nan)
         return float(shares[0]), float(shares[1])
@@ -162,6 +171,7 @@ def performer(
     fall: Mapping[str, float] | None = None,
     tempo: Tempo | None = None,
     realism: str | Path | None = None,
+    physics: str | Path | None = None,
 ) -> Agent:
     """Return an agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
 
@@ -174,6 +184,7 @@ def performer(
     given: dict[str, Any] = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
     given |= {} if tempo is None else {"tempo": tempo}
     given |= {} if realism is None else {"realism": load_realism(realism)}
+    given |= {} if physics is None else {"physics": load_physics(physics)}
     try:
         return load_agent(controller, robot, **given)
     except TypeError:

@@ -18,16 +18,20 @@ from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.balance.mdp.termination import FallLimits
+from poise.envs.physics.engines.config import load_physics
+from poise.envs.physics.engines.engine import check_engine
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 from poise.envs.sensing.realism import load_realism
-from poise.training.motion.tracking.record import AFTER, ANYWHERE, COUNTED, LAST, SETTLING
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
+from poise.training.motion.tracking.record import AFTER, COUNTED, LAST, SETTLING
 from poise.training.motion.tracking.steps import NONE
 
-from .follow import LONGEST, PUSH_TIME, Followed
+from .follow import PUSH_TIME, Followed
 
 START_NOISE = 0.02  # [rad] of each joint of a start
 CLIPS = (".npz", ".csv")
@@ -67,6 +71,7 @@ def follow_clip(
     directions: int = 8,
     seed: int = 0,
     realism: str | Path | None = None,
+    physics: str | Path | None = None,
 ) -> list[Followed]:
     """Let a tracker follow its clip from `starts` disturbed starts in the clip's first frame.
 
@@ -77,16 +82,21 @@ def follow_clip(
 
     Args:
         pushed: the impulse [N·s] of a push in a direction [deg], as in `follow`; None: none.
+        physics: the engine, by name or file; None: MuJoCo.
 
-    Raises ConfigError as `PolicyFile`, for counts below 1, a seed or an impulse below 0.
+    Raises ConfigError as `PolicyFile`, for an engine that is not installed or does not hold the
+    robot, for counts below 1, a seed or an impulse below 0.
     """
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
     whole_number(seed, 0, "seed")
     level: dict[str, Any] = {} if realism is None else {"realism": load_realism(realism)}
+    engine = load_physics(physics)
+    check_engine(engine, robot)
     env = ResidualBalanceEnv(
-        robot, controller=config, pushes=None, duration=LONGEST, fall=ANYWHERE, **level
-    )
+        robot, controller=config, pushes=None, duration=LONGEST, fall=ANYWHERE, physics=engine,
+        **level,
+    )  # fmt: skip
     policy = env.controller
     assert isinstance(policy, PolicyFile) and policy.motion is not None
     track, rng, trials = policy.motion, np.random.default_rng(seed), []
@@ -95,7 +105,7 @@ def follow_clip(
         direction = 360.0 * k / directions % 360.0
         size = 0.0 if pushed is None else pushed(direction)
         if not 0.0 <= size < np.inf:
-            raise ConfigError(f"must be at least 0, not {size:g}", field="impulse")
+            raise out_of_range(size, field="impulse", least=0, form="g")
         push = Push(push_bodies(robot)[0], start, PUSH_TIME, size, direction) if size else None
         trials.append(_followed(env, track, seed + k, push))
     return trials
@@ -110,7 +120,7 @@ def _followed(
     until = max(ends + AFTER, 0.0 if push is None else push.start + SETTLING)
     pushes = [] if push is None else [asdict(push)]
     env.reset(seed=seed, options={"push": pushes, "qpos": _start(env, track, seed)})
-    reference, rest = Reference(env.robot, track), np.zeros(len(env.action_names))
+    reference, rest = ClipReference(env.robot, track), np.zeros(len(env.action_names))
     while not fallen and env.simulation.time < until - 0.5 * period:
         env.step_without_info(rest)
         step = round(env.simulation.time / period)
@@ -141,7 +151,7 @@ def _start(env: ResidualBalanceEnv, track: MotionTrack, seed: int) -> np.ndarray
     return qpos
 
 
-class Reference:
+class ClipReference:
     """Joints, bodies and CoM of a clip where it has been laid."""
 
     def __init__(self, robot: Robot, track: MotionTrack):

@@ -11,6 +11,7 @@ from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.balance.in_place.lqr_lip import LQRLIP, lqr_gain
 from poise.baselines.controller import Targets
 from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.tasks.task import TaskSpace
 from poise.envs.compiled.maths.pendulum import lip_step
 from poise.envs.compiled.maths.polygons import half_planes
 from poise.envs.physics.simulation import Simulation
@@ -24,7 +25,7 @@ def moving(velocity, offset=(0.0, 0.0)):
     targets = Targets.standing(robot(), simulation.state)
     s.com[:2] = targets.com[:2] + offset
     s.com_vel[:2] = velocity
-    s.capture_point[:] = s.com[:2] + s.com_vel[:2] / s.omega[0]
+    s.capture_point[:] = s.com[:2] + s.com_vel[:2] / s.omega
     return simulation.state, targets
 
 
@@ -34,7 +35,8 @@ def test_the_qp_is_asked_for_the_pendulums_acceleration():
     state, targets = moving([0.2, 0.1])
     controller.torques(state, targets)
     p = controller.cop(state, targets)
-    rate = controller.qp.workspace.momentum_rate[:2]
+    ws = controller.qp.workspace
+    rate = ws.desired[ws.part(TaskSpace.FORCE)][:2]
     expected = robot().mass * state.omega**2 * (state.com[:2] - p)
     np.testing.assert_allclose(rate, expected, rtol=1e-9)
 

@@ -110,7 +110,8 @@ def test_the_compiled_problem_has_the_same_solution(root):
         if k % 25 != 3:
             continue
         points = [contact.rows(state) for contact in qp.contacts.values()]
-        readable = build(state, targets, qp.parameters, qp.workspace.cop_vel, points=points)
+        tasks, cop_vel = qp.tasks.values(), qp.workspace.cop_vel
+        readable = build(state, targets, qp.parameters, tasks, cop_vel, points=points)
         solution = make_solver("daqp").solve(readable)
         assert solution.solved
         vdot, w, _ = unknowns(state, solution.x, points)
@@ -209,8 +210,8 @@ def test_controllers_that_step_have_contacts_in_every_contact_set(soles):
     points = [contact.rows(state) for contact in sets.contacts.values()]
     _, ws = contact_sets.tick(sets, state, targets, soles)
     chosen, restricted = sets.sets[soles], contact_sets.restricted(sets, state, targets, soles)
-    cop_vel = chosen.workspace.cop_vel
-    readable = build(restricted, targets, chosen.parameters, cop_vel, points=points)
+    tasks, cop_vel = sets.tasks.values(), chosen.workspace.cop_vel
+    readable = build(restricted, targets, chosen.parameters, tasks, cop_vel, points=points)
     solution = make_solver("daqp").solve(readable)
     assert solution.solved and sets.failures == 0
     vdot, w, _ = unknowns(restricted, solution.x, points)

@@ -9,6 +9,8 @@ from poise.envs.balance.base import env_config
 from poise.envs.balance.servos import holding_torques
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.engines.config import Physics, load_physics
+from poise.envs.physics.engines.engine import Engine
+from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
 
@@ -144,6 +146,26 @@ def test_free_flight_is_the_same_and_differs_by_the_order_of_the_step(robot):
     assert apart[1] < max(0.7 * apart[0], 1e-11)
 
 
+def test_a_push_gives_its_impulse_in_the_same_steps():
+    """In flight the horizontal momentum is that of the push alone, in every step."""
+    robot = load_robot()
+    push = Push("torso", 0.02, 0.1, 20.0, 30.0)
+    qpos = robot.standing_qpos.copy()
+    qpos[2] += 5.0
+    courses = []
+    for engine in (Engine, lambda *made: DrakeEngine(*made, DRAKE)):
+        simulation = Simulation(robot)
+        simulation.engine = engine(robot, simulation.data)
+        simulation.reset(qpos, pushes=[push])
+        rest = np.zeros(robot.model.nu)
+        courses.append([simulation.step(rest).linear_momentum[:2].copy() for _ in range(80)])
+    mujoco_course, drake_course = np.array(courses)
+    share = np.clip((np.arange(1, 81) * 0.002 - 0.02) / 0.1, 0.0, 1.0)[:, None]
+    given = 20.0 * share * [np.cos(np.radians(30.0)), np.sin(np.radians(30.0))]
+    np.testing.assert_allclose(mujoco_course, given, rtol=0, atol=2e-2)
+    np.testing.assert_allclose(drake_course, given, rtol=0, atol=2e-2)
+
+
 def test_a_standing_robot_is_borne_by_its_weight_and_stays():
     robot = load_robot()
     simulation = Simulation(robot)
@@ -238,19 +260,72 @@ def test_a_level_of_realism_changes_what_drake_simulates():
     assert drawn.friction is not None and env.model.geom_friction[0, 0] == drawn.friction
 
 
-@pytest.mark.parametrize("direction", [30.0, 45.0])
-def test_sliding_soles_bear_as_much_along_the_ground_as_friction_lets_them(direction):
-    """Towards every side: the cone is circular, unlike MuJoCo's pyramid."""
+@pytest.mark.parametrize("direction", [30.0, 135.0])
+def test_friction_of_sliding_points_is_that_of_the_lagged_cone(direction):
+    """f_t = −μ f₀ v/√(v² + v_s²) with the slip v after the step and the normal force at its start,
+    f₀ = k x (1 − d v_n): circular, unlike MuJoCo's pyramid. Soles that turn slide towards several
+    sides, so all together bear less than μ times the normal force.
+    """
+    from pydrake.multibody.tree import JacobianWrtVariable
+
+    robot = load_robot()
+    simulation = Simulation(robot)
+    simulation.engine = engine = DrakeEngine(robot, simulation.data, DRAKE)
+    angle, qvel = np.radians(direction), np.zeros(robot.model.nv)
+    qvel[:2] = 0.3 * np.cos(angle), 0.3 * np.sin(angle)
+    qpos = robot.standing_qpos.copy()
+    qpos[2] -= 5e-4  # in contact
+    force = simulation.reset(qpos, qvel).contact_wrench[:3]
+    plant, made = engine._plant, engine._plant.plant
+    given = plant.to_drake(simulation.data.xmat[robot.root_body_id].reshape(3, 3), engine._forces())
+    before = made.GetVelocities(plant.context)
+    after = plant.step(given)[made.num_positions() :]
+    results, world = plant._results.Eval(plant.context), made.world_frame()
+    stiffness = robot.mass * robot.units.gravity / DRAKE.sink
+    assert results.num_point_pair_contacts() == 8
+    total, reach = np.zeros(3), 0.0
+    for i in range(8):
+        contact = results.point_pair_contact_info(i)
+        first = int(contact.bodyA_index()) == 0
+        body = made.get_body(contact.bodyB_index() if first else contact.bodyA_index())
+        own = (1.0 if first else -1.0) * contact.contact_force()
+        point = body.EvalPoseInWorld(plant.context).inverse() @ contact.contact_point()
+        jacobian = made.CalcJacobianTranslationalVelocity(
+            plant.context, JacobianWrtVariable.kV, body.body_frame(), point, world, world
+        )
+        normal = stiffness * contact.point_pair().depth
+        normal *= 1.0 - DRAKE.dissipation * (jacobian @ before)[2]
+        slip = (jacobian @ after)[:2]
+        expected = -0.8 * normal * slip / np.hypot(np.linalg.norm(slip), DRAKE.slip)
+        np.testing.assert_allclose(own[:2], expected, rtol=1e-5, atol=1e-6)
+        total, reach = total + own, reach + np.linalg.norm(own[:2])
+    np.testing.assert_allclose(total, force, rtol=1e-9)
+    assert np.linalg.norm(total[:2]) < reach - 1e-6
+
+
+def test_sliding_soles_stay_on_the_ground():
+    """Convex contact models lift what slides; Coulomb's friction does not."""
     robot = load_robot()
     simulation = Simulation(robot)
     simulation.engine = DrakeEngine(robot, simulation.data, DRAKE)
-    angle, qvel = np.radians(direction), np.zeros(robot.model.nv)
-    qvel[:2] = 0.3 * np.cos(angle), 0.3 * np.sin(angle)
-    force = simulation.reset(None, qvel).contact_wrench[:3]
-    friction = 0.8  # of the humanoid's soles and its floor
-    assert force[2] > 0.1 * robot.units.force
-    # points of a sole that turns slide towards several sides: together they bear a little less
-    assert 0.99 * friction < np.hypot(force[0], force[1]) / force[2] <= friction * (1.0 + 1e-6)
+    hold, dofs = holding_torques(robot), robot.motor_dofs
+
+    def stand(steps):
+        borne = []
+        for _ in range(steps):
+            away = robot.standing_qpos[dofs + 1] - simulation.data.qpos[dofs + 1]
+            simulation.step(hold + 500.0 * away - 20.0 * simulation.data.qvel[dofs])
+            borne.append(simulation.state.contact_wrench[2] / robot.units.force)
+        return np.array(borne)
+
+    simulation.reset()
+    stand(100)
+    qpos, qvel = simulation.data.qpos.copy(), simulation.data.qvel.copy()
+    qvel[0] += 2.0
+    simulation.reset(qpos, qvel)
+    assert simulation.state.contact_wrench[2] < 1.2 * robot.units.force
+    borne = stand(15)
+    assert borne.min() > 0.7 and borne.max() < 1.3
 
 
 @pytest.mark.parametrize("speed", [np.nan, 1e200])

@@ -12,8 +12,10 @@ from poise.envs.physics.engines import config
 from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.benchmarking.results.pages import check_alike
-from poise.training.benchmarking.results.replay import replay
+from poise.training.benchmarking.results.read import load_results
+from poise.training.benchmarking.results.replay import film, replay
 from tests.support.evaluations import RANDOM, InProcess, write_suite
+from tests.support.shared import robot
 
 
 @pytest.fixture
@@ -55,6 +57,32 @@ def test_a_suite_in_drake_is_kept_gone_on_with_and_played_again(
     assert not replay(out, number).differences
     with pytest.raises(ConfigError, match="physics"):
         check_alike({"a": summary, "b": plain}, lambda of: {})
+
+
+@pytest.mark.usefixtures("can_render", "few_frames")
+def test_a_trial_in_drake_is_filmed_as_drake_steps_it(
+    tmp_path: Path, in_process: type[InProcess], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo draws the states; its own steps take no part, even after the fall."""
+    pytest.importorskip("pydrake", reason="Drake is not installed: pip install --no-deps drake")
+    from poise.envs.physics.engines.drake import DrakeEngine
+
+    out = tmp_path / "drake"
+    evaluate(["zero"], write_suite(tmp_path, RANDOM), out=out, seed=3, physics="drake", trials=2)
+    steps, states, own = 0, set(), DrakeEngine._step
+
+    def counted(engine: DrakeEngine) -> None:
+        nonlocal steps
+        own(engine)
+        steps += 1
+        states.add(engine.data.qpos.tobytes())
+
+    monkeypatch.setattr(DrakeEngine, "_step", counted)
+    film(out, 0, ["zero"], tmp_path / "trial.mp4", size=(64, 48))
+    assert (tmp_path / "trial.mp4").read_bytes()[4:8] == b"ftyp"
+    record = load_results(out).record("zero", 0)
+    fall, timestep = float(record.line["fall_time"]), robot("humanoid").model.opt.timestep
+    assert steps >= round(fall / timestep) and len(states) == steps
 
 
 def test_what_drake_does_not_hold_is_refused_before_anything_is_written(

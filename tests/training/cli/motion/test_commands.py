@@ -137,6 +137,8 @@ def test_steps_are_joined_and_put_together(
         (["check", "squat", "--fit"], "out: --fit and --out go together"),
         (["check", "squat", "--fit", "--out", "x.npz"], "squat: fit: only a .npz of poise motion"),
         (["check", "squat", "--qp", "--controller", "pd"], "controller: 'pd' is of kind"),
+        (["follow", "bow", "--physics", "bullet"], "physics: no such name: 'bullet'"),
+        (["follow", "bow", "--physics", "mujoco", "--fastest"], "fastest: goes with --controller,"),
         (["follow", "nothing.npz"], "nothing.npz: cannot be read (No such file or directory)"),
     ],
 )

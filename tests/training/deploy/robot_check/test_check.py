@@ -20,7 +20,7 @@ from poise.envs.robots.robot import load_robot
 from poise.training.cli.entry import main
 from poise.training.deploy.robot_check import check as module
 from poise.training.deploy.robot_check.check import RobotCheck, check_robot
-from poise.training.deploy.robot_check.tables import print_check
+from poise.training.deploy.robot_check.tables import print_robot_check
 from poise.training.deploy.robot_check.uses import IN_PLACE, STEPPING, Uses
 from tests.support.small_biped import LEG, motors, write_biped
 from tests.support.small_urdf import INERTIAL, write_urdf
@@ -167,7 +167,7 @@ def shown(check: RobotCheck) -> str:
     console = Console(width=140, record=True, quiet=True)
     console.quiet = False
     with console.capture() as captured:
-        print_check(check, console)
+        print_robot_check(check, console)
     return captured.get()
 
 

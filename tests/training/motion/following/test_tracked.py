@@ -68,6 +68,18 @@ def test_it_follows_a_clip(tmp_path: Path) -> None:
     assert hit[0].fallen and hit[0].push is not None and hit[0].push["impulse"] == 60.0
 
 
+def test_it_follows_a_clip_in_another_engine(tmp_path: Path) -> None:
+    pytest.importorskip("pydrake", reason="Drake is not installed: pip install --no-deps drake")
+    config = tracker_config(tracker(tmp_path, motion={"rate": 50.0}))
+    assert config is not None
+    config = following(config, waving(tmp_path / "clip.csv"))
+    (own,), (other,) = (
+        follow_clip(config, BODY, starts=1, seed=3, physics=engine) for engine in (None, "drake")
+    )
+    assert not other.fallen and other.joint_rms < np.radians(4.0)
+    assert other.joint_rms != own.joint_rms
+
+
 def test_its_clip_is_held_where_nothing_plays_it(tmp_path: Path) -> None:
     """In an environment of pushes the first frame stands; the robot's arms do, too."""
     waving(tmp_path / "clip.csv")
