@@ -91,8 +91,7 @@ def test_without_support_nothing_is_learned():
 def test_an_episode_begins_with_nothing():
     """`forget_pushes` makes the estimate what it is at first."""
     estimate = push_force(ROBOT.omega)
-    estimate.force[:] = estimate.mean[:] = 3.0
-    estimate.size, estimate.begun = 3.0, 3
+    estimate.force[:], estimate.mean[:], estimate.size, estimate.begun = 3.0, 3.0, 3.0, 1
     forget_pushes(estimate)
     fresh = push_force(ROBOT.omega)
     for name in ("force", "mean", "size", "begun"):
