@@ -16,6 +16,7 @@ SETTLING = 4.0  # [s] after a change of the command, from which strides are comp
 SPEED_TOLERANCE, TURN_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad/s] beyond its own error
 FALLING = 1.0  # [s] before a fall, in which strides are part of the fall
 STOPPED = 1.0  # [s] without a touchdown, after which a robot does not walk any more
+STANDING = 2.0  # [s] without a stride, from which each second counts where it is to walk
 SLOW = 0.1  # [m/s] below which the cost of transport is undefined
 WINDOW = 4  # steps, two strides, by which the end of a walk is judged
 
@@ -82,6 +83,7 @@ class RecordedWalk:
         begun = [self._changed(record.time[row]) for row in rows[2:]]
         self.settled = record.time[rows[:-2]] >= np.array(begun) + SETTLING
         self.settled &= record.time[rows[2:]] <= until
+        self._until = until
         self._known = np.zeros(len(record.time), dtype=bool)  # rows of settled strides
         for first, last in np.array(spans, dtype=int).reshape(-1, 2)[self.settled]:
             self._known[first:last] = True
@@ -157,8 +159,14 @@ class RecordedWalk:
         return last is not None and near(last, own)
 
     def figures(self) -> dict[str, float | None]:
-        """Return the figures of an `Outcome`, of the strides and steps that are settled."""
-        velocity, error = self.velocity[self.settled], (self.velocity - self.wanted)[self.settled]
+        """Return the figures of an `Outcome`, of the strides and steps that are settled.
+
+        A robot that stands where it is to walk has no strides: its errors and velocities count each
+        second of it, see `_stood`.
+        """
+        stood, meant = self._stood()
+        velocity = np.concatenate([self.velocity[self.settled], stood])
+        error = velocity - np.concatenate([self.wanted[self.settled], meant])
         off, turn = np.linalg.norm(error[:, :2], axis=1), error[:, 2]
         return {
             "speed_ahead": _mean(velocity[:, 0]),
@@ -174,6 +182,24 @@ class RecordedWalk:
             "foot_slide": self._slide(),
             "yaw_momentum": _root_mean_square(self.record.spin[self._known]),
         }
+
+    def _stood(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the mean velocity (k, 3) of each second in which the robot is commanded to walk,
+        for 4 s or more, and takes no stride for 2 s or more; and the command (k, 3)."""
+        time = self.record.time
+        idle = ~self._known & (time <= self._until)
+        idle &= time >= np.array([self._changed(each) for each in time]) + SETTLING
+        idle &= np.array([self.command_at(each).array()[:3].any() for each in time], dtype=bool)
+        found, wanted = [], []
+        for first, last in runs_of(idle).tolist():
+            seconds = int(time[last - 1] - time[first] + 1e-9)
+            if seconds < STANDING:
+                continue
+            rows = np.searchsorted(time, time[first] + np.arange(seconds + 1) - 1e-9)
+            for one, other in zip(rows[:-1], rows[1:], strict=True):
+                found.append(self.mean_velocity(one, other))
+                wanted.append(self.command_at(time[one]).array()[:3])
+        return np.array(found).reshape(-1, 3), np.array(wanted).reshape(-1, 3)
 
     def _steps(self) -> dict[str, float | None]:
         """Return means of the steps that end settled strides, and their error."""

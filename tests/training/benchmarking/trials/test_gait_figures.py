@@ -207,6 +207,26 @@ def test_only_settled_strides_count() -> None:
     np.testing.assert_array_equal(fell.settled, told.settled & (ends <= 14.0))
 
 
+def test_who_stands_where_it_is_to_walk_is_off_by_the_command() -> None:
+    """Each second without a stride counts, in a command to walk alone, and before a fall."""
+    record = recorded(ahead=0.0)
+    still = replace(record, down=np.ones_like(record.down), com=np.zeros_like(record.com))
+    commands = (TimedCommand(0.3), TimedCommand(0.0, start=10.0))
+    figures = RecordedWalk(still, commands).figures()
+    assert figures["speed_error"] == pytest.approx(0.3) and figures["speed_ahead"] == 0.0
+    assert figures["step_length"] is None
+    assert RecordedWalk(still, (TimedCommand(0.0),)).figures()["speed_error"] is None
+    assert RecordedWalk(still, commands, fall_time=5.5).figures()["speed_error"] is None
+    half = np.arange(len(record.time)) < len(record.time) // 2  # ten seconds, six of them settled
+    both = replace(recorded(), down=recorded().down | ~half[:, None])
+    walked = RecordedWalk(both, (TimedCommand(0.5),))
+    assert (walked.landed.row < len(record.time) // 2 + 1).all()
+    strides, seconds = int(walked.settled.sum()), 10
+    com = np.where(half[:, None], both.com, both.com[half][-1])
+    error = RecordedWalk(replace(both, com=com), (TimedCommand(0.5),)).figures()["speed_error"]
+    assert error == pytest.approx(0.5 * seconds / (strides + seconds), abs=0.03)
+
+
 def test_as_commanded_is_within_5_cm_a_second_and_5_degrees_a_second() -> None:
     """Speeds and turns on both sides of the limit; too few steps, and a robot that has stopped."""
     assert walk(0.5).as_commanded()
