@@ -1,6 +1,7 @@
 """The figures of a walk: its speed against the command, its steps, what it costs."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -196,7 +197,7 @@ class RecordedWalk:
             if seconds < STANDING:
                 continue
             rows = np.searchsorted(time, time[first] + np.arange(seconds + 1) - 1e-9)
-            for one, other in zip(rows[:-1], rows[1:], strict=True):
+            for one, other in pairwise(rows):
                 found.append(self.mean_velocity(one, other))
                 wanted.append(self.command_at(time[one]).array()[:3])
         return np.array(found).reshape(-1, 3), np.array(wanted).reshape(-1, 3)
