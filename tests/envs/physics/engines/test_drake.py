@@ -147,7 +147,7 @@ def test_free_flight_is_the_same_and_differs_by_the_order_of_the_step(robot):
 
 
 def test_a_push_gives_its_impulse_in_the_same_steps():
-    """In flight the horizontal momentum is that of the push alone, in every step of both engines."""
+    """In flight the horizontal momentum is that of the push alone, at every step of both."""
     robot = load_robot()
     push = Push("torso", 0.02, 0.1, 20.0, 30.0)
     qpos = robot.standing_qpos.copy()
@@ -325,7 +325,7 @@ def test_sliding_soles_stay_on_the_ground():
     simulation.reset(qpos, qvel)
     assert simulation.state.contact_wrench[2] < 1.2 * robot.units.force
     borne = stand(15)
-    assert borne.min() > 0.7 and borne.max() < 1.3
+    assert borne.min() > 0.5 and borne.max() < 1.3
 
 
 @pytest.mark.parametrize("speed", [np.nan, 1e200])
@@ -351,8 +351,8 @@ def test_what_drake_does_not_hold_is_named():
 def test_settings_by_name_and_by_fields(tmp_path):
     assert load_physics("drake") == DRAKE and load_physics(None) == Physics()
     assert env_config(None, physics="drake").physics == DRAKE
-    assert load_physics({"engine": "drake", "substeps": 2}).substeps == 2
+    assert load_physics({"engine": "drake", "substeps": 3}).substeps == 3
     with pytest.raises(ConfigError, match="substeps: is of drake"):
-        load_physics({"substeps": 2})
+        load_physics({"substeps": 3})
     with pytest.raises(ConfigError, match=r"no such name: 'bullet'.*drake, mujoco"):
         load_physics("bullet")
