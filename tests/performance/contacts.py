@@ -58,7 +58,7 @@ def settings() -> list[Setting]:
     for contact in ("lagged", "sap"):
         rows += [
             Setting(contact, f"Drake, {contact}, {2 / n:g} ms",
-                    Physics("drake", substeps=n, contact=contact))  # type: ignore[arg-type]
+                    Physics("drake", substeps=n, contact=contact))
             for n in DRAKE_STEPS
         ]  # fmt: skip
     for name, given in (
