@@ -15,13 +15,8 @@ __all__ = [
     "CompiledController",
     "Controller",
     "GaitCommand",
-    "IkGoal",
-    "IkOptions",
-    "IkResult",
-    "InverseKinematics",
     "MomentumQP",
     "MomentumQPConfig",
-    "PosePrior",
     "ReferenceMotion",
     "ResidualBalanceEnv",
     "ResidualScales",
@@ -36,9 +31,18 @@ __all__ = [
     "WrappedController",
     "load_controller",
     "load_motion",
+]
+
+#: public names that are those of `poise.baselines.motion` now; read here for one release
+MOVED = {
+    "IkGoal",
+    "IkOptions",
+    "IkResult",
+    "InverseKinematics",
+    "PosePrior",
     "retarget_clip",
     "solve_ik",
-]
+}
 
 if TYPE_CHECKING:
     from poise.baselines.balance.references.motion import load_motion
@@ -58,17 +62,6 @@ if TYPE_CHECKING:
     from poise.baselines.environments.stepping import ResidualStepEnv
     from poise.baselines.environments.walking import ResidualWalkEnv
     from poise.baselines.environments.whole import ResidualWholeEnv
-    from poise.baselines.motion.retargeting.inverse_kinematics.goals import (
-        IkGoal,
-        IkOptions,
-        IkResult,
-    )
-    from poise.baselines.motion.retargeting.inverse_kinematics.prior import PosePrior
-    from poise.baselines.motion.retargeting.inverse_kinematics.solve import (
-        InverseKinematics,
-        solve_ik,
-    )
-    from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.baselines.registry import load_controller
     from poise.baselines.walking.controller import WalkingController
     from poise.baselines.walking.planner.command import GaitCommand
@@ -76,4 +69,15 @@ if TYPE_CHECKING:
     from poise.baselines.whole_body.gains import MomentumQPConfig
     from poise.baselines.whole_body.momentum_qp import MomentumQP
 else:
-    __getattr__, __dir__ = lazy(__name__, __file__)
+    _find, __dir__ = lazy(__name__, __file__)
+
+    def __getattr__(name: str) -> object:
+        if name not in MOVED:
+            return _find(name)
+        import warnings
+
+        from poise.baselines.extras import load_extra
+
+        message = f"poise.baselines.{name} is poise.baselines.motion.{name}"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return load_extra("moved", "motion", f"poise.baselines.{name}")(name)

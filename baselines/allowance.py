@@ -7,7 +7,8 @@ it is to run its module. `find_plugin`, the one function that imports what has b
 - what the user types as a controller, or hands to an environment (`named`), and
 - what the user also allows: ``--allow`` of a command, ``allow=`` in Python.
 
-A scope ends with its block, in its thread; processes are sent it with their work (`carried`).
+A scope ends with its block, in its thread; processes are sent it with their work
+(`carrying_allowance`).
 """
 
 import functools
@@ -160,7 +161,7 @@ def allow_words(names: Iterable[str]) -> list[str]:
     return [word for name in names for word in ("--allow", name)]
 
 
-def carried(function: Callable[P, R]) -> Callable[P, R]:
+def carrying_allowance(function: Callable[P, R]) -> Callable[P, R]:
     """The function, taking what is allowed here to wherever it is called; it can be pickled."""
     return functools.partial(_inside, _current.get(), function)
 

@@ -13,6 +13,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -21,7 +22,7 @@ COMMAND_ENTRIES = 8  # of `BaseController.orders`
 _no_numbers = partial(guarded_zeros, 0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Outputs(Block):
     """The arrays in which compiled code finds what a controller's tick gave.
 
@@ -31,7 +32,7 @@ class Outputs(Block):
 
     tau: np.ndarray  # (nv−6,) joint torques [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
-    failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
+    failures: Mutable[int]  # ticks since the reset that could not be solved
     soft_root: bool
     # (nv,) accelerations that the torques are to bring; (0,): not known
     vdot: np.ndarray = field(default_factory=_no_numbers)

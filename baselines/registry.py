@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from poise.baselines.balance.in_place.capture_point import CapturePoint, CapturePointConfig
+from poise.baselines.balance.in_place.get_up import GetUp, GetUpConfig
 from poise.baselines.balance.in_place.jacobian_transpose import (
     JacobianTranspose,
     JacobianTransposeConfig,
@@ -16,8 +17,6 @@ from poise.baselines.balance.in_place.pd import PD, PDConfig, StablePD, StablePD
 from poise.baselines.balance.stepping.capture_step import CaptureStep
 from poise.baselines.balance.stepping.ipm_step import IPMStep
 from poise.baselines.balance.stepping.planning.config import CaptureStepConfig, IPMStepConfig
-from poise.baselines.motion.performing.config import MotionStepConfig
-from poise.baselines.motion.performing.motion_step import MotionStep
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.known import RIVALS
@@ -35,22 +34,25 @@ from poise.envs.sensing.realism import Realism
 
 from .allowance import is_plugin
 from .controller import Controller
+from .extras import load_extra, missing_extra, registered
 from .plugins import PluginConfig, PluginController, plugin_config
 
 #: The configuration of a controller of this package, or of one from outside.
 ControllerConfig = (
     MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
     | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | PluginConfig
-    | CaptureStepConfig | IPMStepConfig | MotionStepConfig | WalkConfig | SimbiconConfig
-    | PolicyFileConfig
+    | CaptureStepConfig | IPMStepConfig | WalkConfig | SimbiconConfig | PolicyFileConfig
+    | GetUpConfig
 )  # fmt: skip
 
-#: `kind` → its configuration and its controller, which takes (robot, configuration).
+#: `kind` → its configuration and its controller, which takes (robot, configuration). Extras add
+#: further ones by entry points of the group ``poise.controllers``, see `kinds`.
 KINDS: dict[str, tuple[type, type]] = {
     "momentum-qp": (MomentumQPConfig, MomentumQP),
     "pd": (PDConfig, PD),
     "stable-pd": (StablePDConfig, StablePD),
     "jacobian-transpose": (JacobianTransposeConfig, JacobianTranspose),
+    "get-up": (GetUpConfig, GetUp),
     "kudoh02": (Kudoh02Config, Kudoh02),
     "macchietto09": (Macchietto09Config, Macchietto09),
     "capture-point": (CapturePointConfig, CapturePoint),
@@ -59,11 +61,12 @@ KINDS: dict[str, tuple[type, type]] = {
     "outside": (PluginConfig, PluginController),
     "capture-step": (CaptureStepConfig, CaptureStep),
     "ipm-step": (IPMStepConfig, IPMStep),
-    "motion-step": (MotionStepConfig, MotionStep),
     "walk": (WalkConfig, Walk),
     "simbicon": (SimbiconConfig, Simbicon),
     "policy-file": (PolicyFileConfig, PolicyFile),
 }
+
+MOTION_STEP = "motion-step"  # the kind that poise[motion] adds, which packaged files have
 
 
 def controller_config(controller: str | Path | Mapping[str, object]) -> ControllerConfig:
@@ -120,25 +123,51 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
         raise ConfigError(
             f"{shown(str(name_or_path))} is of kind {config.kind!r}, not a momentum QP",
             field="controller",
-            choices=_packaged(MomentumQPConfig),
+            choices=_packaged("momentum-qp"),
         )
     return config
 
 
 def walking_controllers(*, planners: bool = False) -> list[str]:
     """The packaged controllers that walk, or those of them that plan their steps."""
-    return _packaged(WalkConfig) if planners else _packaged(WalkConfig, SimbiconConfig)
+    return _packaged("walk") if planners else _packaged("walk", "simbicon")
 
 
 def performing_controllers() -> list[str]:
     """The packaged controllers that perform motions whose feet leave the ground."""
-    return _packaged(MotionStepConfig)
+    return _packaged(MOTION_STEP)
 
 
-def _packaged(*kinds: type) -> list[str]:
-    """The packaged controllers whose configurations are of these classes."""
+def available_controllers() -> list[str]:
+    """The packaged controllers whose extras are installed."""
     names = packaged("controllers")
-    return [name for name in names if isinstance(controller_config(name), kinds)]
+    further = {name: _kind_of(name) for name in names if _kind_of(name) not in KINDS}
+    return [
+        name for name in names
+        if name not in further or missing_extra("controllers", further[name]) is None
+    ]  # fmt: skip
+
+
+def _packaged(*kinds: str) -> list[str]:
+    """The packaged controllers of these kinds."""
+    return [name for name in packaged("controllers") if _kind_of(name) in kinds]
+
+
+def _kind_of(name: str) -> str:
+    """The kind of a packaged controller, which nothing is imported for."""
+    path = resolve("controllers", name)
+    return str(on_base(read_yaml(path), "controllers", str(path)).get("kind", "momentum-qp"))
+
+
+def kinds() -> tuple[str, ...]:
+    """All kinds of controllers, those of extras too, whether or not they are installed."""
+    return tuple(dict.fromkeys([*KINDS, MOTION_STEP, *registered("controllers")]))
+
+
+def kind_classes(kind: str) -> tuple[type, type]:
+    """The configuration and the controller of a kind; raises MissingExtra, see `load_extra`."""
+    classes: tuple[type, type] = KINDS.get(kind) or load_extra("controllers", kind)
+    return classes
 
 
 def load_controller(
@@ -152,7 +181,9 @@ def load_controller(
     """
     if isinstance(controller, (str, Path, Mapping)):
         controller = controller_config(controller)
-    for config_class, controller_class in KINDS.values():
+    kind = getattr(controller, "kind", None)
+    if isinstance(kind, str) and kind in kinds():
+        config_class, controller_class = kind_classes(kind)
         if type(controller) is config_class:
             return controller_class(robot, controller)
     if isinstance(controller, Controller):
@@ -187,15 +218,15 @@ def _build(data: dict[str, object], source: str) -> ControllerConfig:
     data = on_base(data, bases, source, parts=("qp", "step_qp"))
     data = {name: value for name, value in data.items() if name not in not_given}
     kind = data.get("kind", "momentum-qp")
-    if not isinstance(kind, str) or kind not in KINDS:
+    if not isinstance(kind, str) or kind not in (known := kinds()):
         raise ConfigError(
-            f"no such kind of controller: {shown(kind)}", source=source, field="kind", choices=KINDS
+            f"no such kind of controller: {shown(kind)}", source=source, field="kind", choices=known
         )
     if kind == "policy-file":
         return policy_file_config(data, Path(source))
     inner = data.get("qp")
     if isinstance(inner, str):
         data = {**data, "qp": read_yaml(resolve("controllers", inner))}
-    config: ControllerConfig = build(KINDS[kind][0], data, source)
+    config: ControllerConfig = build(kind_classes(kind)[0], data, source)
     where_uncertain(config, source)
     return config

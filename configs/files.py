@@ -10,6 +10,7 @@ from pathlib import Path
 
 from .errors import ConfigError, PoiseError, meant, shown
 from .outputs import check_out_folder
+from .problems import Problem
 from .reading import is_file, is_folder
 
 #: kind → suffixes that are accepted in addition to those of YAML
@@ -44,19 +45,15 @@ def resolve(kind: str, name: str | Path) -> Path:
     """
     names = packaged(kind)
     if not isinstance(name, (str, Path)):
-        raise ConfigError(f"must be a name or a path, not {shown(name)}", field=kind, choices=names)
+        raise Problem("type", None, kind, names, expected="a name or a path", value=shown(name))
     if str(name) in names:
         return packaged_folder(kind) / f"{name}.yaml"
     path = Path(name)
     if path.suffix.lower() in (".yaml", ".yml", *OTHERS.get(kind, ())) and is_file(path):
         return path
-    problem = "no such file" if path.suffix or len(path.parts) > 1 else "no such name"
+    problem = "no file" if path.suffix or len(path.parts) > 1 else "unknown name"
     hint = meant(name, names) or ";"
-    raise ConfigError(
-        f"{problem}: {shown(str(name))}{hint} give a path to a .yaml file or a packaged name",
-        field=kind,
-        choices=names,
-    )
+    raise Problem(problem, None, kind, names, value=shown(str(name)), hint=hint)
 
 
 def write_atomic(path: str | Path, content: str | bytes) -> None:

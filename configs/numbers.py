@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .errors import ConfigError
+from .problems import Problem, out_of_range
 
 
 def real_array(value: Any) -> np.ndarray | None:
@@ -33,10 +34,10 @@ def finite_array(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
 def whole_number(value: Any, least: int, field: str, source: str | None = None) -> int:
     """`value` as an int; raises ConfigError unless it is a whole number of at least `least`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral):
-        problem = f"must be a whole number, not {type(value).__name__}"
-        raise ConfigError(problem, source=source, field=field)
+        found = type(value).__name__
+        raise Problem("type", source, field, expected="a whole number", value=found)
     if value < least:
-        raise ConfigError(f"must be at least {least}, not {value}", source=source, field=field)
+        raise out_of_range(int(value), field, source, least=least)
     return int(value)
 
 
@@ -64,6 +65,6 @@ def option_mapping(options: Any) -> dict[Any, Any]:
     if options is None:
         return {}
     if not isinstance(options, Mapping):
-        problem = f"must be a mapping, not {type(options).__name__}"
-        raise ConfigError(problem, source="reset", field="options")
+        found = type(options).__name__
+        raise Problem("type", "reset", "options", expected="a mapping", value=found)
     return dict(options)

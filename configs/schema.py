@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import operator
 import types
 from pathlib import Path
 from typing import (
@@ -21,6 +22,7 @@ import yaml
 from .errors import ConfigError, meant, shown
 from .files import packaged, resolve
 from .kinds import OfKind, kind_of
+from .problems import Problem, out_of_range
 from .reading import read_yaml
 from .yaml_loader import DEPTH
 
@@ -147,8 +149,8 @@ def to_yaml(obj: Any) -> str:
 def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
     """The value as the type hint wants it; `path` is the dotted field, `bounds` its metadata."""
 
-    def wrong(expected: str) -> ConfigError:
-        return ConfigError(f"must be {expected}, not {shown(value)}", source=source, field=path)
+    def wrong(expected: str) -> Problem:
+        return Problem("type", source, path, expected=expected, value=shown(value))
 
     origin, args = get_origin(hint), get_args(hint)
     if hint is Any:
@@ -163,9 +165,7 @@ def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
         return _build_union(args, value, source, path, bounds)
     if origin is Literal:
         if not any(value == arg and type(value) is type(arg) for arg in args):
-            raise ConfigError(
-                f"unknown value {shown(value)}", source=source, field=path, choices=args
-            )
+            raise Problem("unknown value", source, path, args, value=shown(value))
         return value
     if origin in (tuple, list) or hint in (tuple, list):
         if not isinstance(value, (list, tuple)):
@@ -201,33 +201,24 @@ def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
 def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
     fields = {field.name: field for field in dataclasses.fields(cls) if field.init}
     if not isinstance(data, dict):
-        raise ConfigError(
-            f"must be a mapping of fields, not {shown(data)}",
-            source=source,
-            field=path,
-            choices=fields,
+        raise Problem(
+            "type", source, path, fields, expected="a mapping of fields", value=shown(data)
         )
     prefix = f"{path}." if path else ""
     renamed = getattr(cls, "RENAMED", {})
     for key in data:
         if key in renamed and key not in fields:
-            raise ConfigError(
-                f"is now {shown(renamed[key])}", source=source, field=f"{prefix}{key}"
-            )
+            raise Problem("renamed", source, f"{prefix}{key}", name=shown(renamed[key]))
         if key not in fields:
-            raise ConfigError(
-                f"unknown field{meant(key, fields)}",
-                source=source,
-                field=f"{prefix}{key}",
-                choices=fields,
-            )
+            hint = meant(key, fields)
+            raise Problem("unknown field", source, f"{prefix}{key}", fields, hint=hint)
     hints = get_type_hints(cls)
     values = {}
     for name, field in fields.items():
         if name in data:
             values[name] = _build(hints[name], data[name], source, prefix + name, field.metadata)
         elif field.default is field.default_factory is dataclasses.MISSING:
-            raise ConfigError("this field is missing", source=source, field=prefix + name)
+            raise Problem("missing", source, prefix + name)
     try:
         return cls(**values)
     except ValueError as error:
@@ -241,8 +232,8 @@ def _of_kind(cls: Any, data: Any, source: str, path: str) -> Any:
     kinds, field = cls.kinds(), f"{path}.kind" if path else "kind"
     kind = data.get("kind")
     if not isinstance(kind, str) or kind not in kinds:
-        problem = "this field is missing" if kind is None else f"no such kind: {shown(kind)}"
-        raise ConfigError(problem, source=source, field=field, choices=kinds)
+        problem = "missing" if kind is None else "unknown kind"
+        raise Problem(problem, source, field, kinds, value=shown(kind))
     return kinds[kind]
 
 
@@ -280,8 +271,8 @@ def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -
 
 
 def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -> int | float:
-    def wrong(expected: str) -> ConfigError:
-        return ConfigError(f"must be {expected}, not {shown(value)}", source=source, field=path)
+    def wrong(expected: str) -> Problem:
+        return Problem("type", source, path, expected=expected, value=shown(value))
 
     allowed = int if kind is int else (int, float)
     if isinstance(value, bool) or not isinstance(value, allowed):
@@ -293,10 +284,9 @@ def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -
         finite = False
     if not finite:
         raise wrong("a finite number")
-    if "min" in bounds and number < bounds["min"]:
-        raise wrong(f"at least {bounds['min']}")
-    if "max" in bounds and number > bounds["max"]:
-        raise wrong(f"at most {bounds['max']}")
-    if "above" in bounds and number <= bounds["above"]:
-        raise wrong(f"above {bounds['above']}")
+    for name, bound, inside in (
+        ("least", "min", operator.ge), ("most", "max", operator.le), ("above", "above", operator.gt)
+    ):  # fmt: skip
+        if bound in bounds and not inside(number, bounds[bound]):
+            raise out_of_range(value, path, source, **{name: bounds[bound]})
     return number

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from poise.lazy import lazy
 
 __all__ = [
+    "LowCmdBridge",
+    "LowCmdRobot",
     "Measurement",
     "MotorCommand",
     "Policy",
@@ -41,6 +43,8 @@ if TYPE_CHECKING:
     from poise.training.benchmarking.results.replay import replay
     from poise.training.deploy.export.dataset import write_dataset
     from poise.training.deploy.export.export import export_policy
+    from poise.training.deploy.lowcmd.bridge import LowCmdBridge
+    from poise.training.deploy.lowcmd.simulated import LowCmdRobot
     from poise.training.deploy.standalone.controller import StandaloneController, load_standalone
     from poise.training.deploy.standalone.readings import Measurement, Readings
     from poise.training.deploy.standalone.sensed import MotorCommand, SensedController

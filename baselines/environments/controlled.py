@@ -16,7 +16,7 @@ from poise.baselines.controller import (
 from poise.baselines.walking.schedule import follow_timetable
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_steps
-from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
+from poise.envs.balance.episode import judge_step, record_tick
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, Program, address_of
 
@@ -135,7 +135,7 @@ class ControlledEnv(CommandedEnv):
             step.play()
             self.check()
         else:
-            self.episode.ticks[0] = 0  # the controller may have raised in the middle of a step
+            self.episode.ticks = 0  # the controller may have raised in the middle of a step
             for _ in range(self.ticks):
                 self._tick_in_python()
 
@@ -154,7 +154,7 @@ class ControlledEnv(CommandedEnv):
         """Play the control tick of `policy_tick` with any controller."""
         sim, e, a = self.simulation, self.episode, self._target_inputs()
         ctrl, wrench = sim.views.ctrl, e.root_wrench
-        if e.ticks[0] == 0:
+        if e.ticks == 0:
             set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
         set_targets(a)
         source = self.state_source
@@ -162,17 +162,17 @@ class ControlledEnv(CommandedEnv):
         if len(source.promise) and (promised := self._base.vdot) is not None:
             source.promise[:] = promised
         add_torques(a.residual, self.arrays.torque_limit, ctrl)
-        sim.bus.servoed[0] = 0
+        sim.bus.servoed = 0
         wrench[:] = self._base.root_wrench
         self._push_root(wrench)
         record_tick(sim.arrays, sim.state_arrays.qvel, ctrl, float(self.controller.period), e)
         sim.step(ctrl, self.control_substeps)
         source.update()
-        e.ticks[0] += 1
-        if e.ticks[0] != self.ticks:
+        e.ticks += 1
+        if e.ticks != self.ticks:
             return
-        e.ticks[0] = 0  # the end of the policy step, as of `end_tick`
-        e.metrics[FAILURES] = self._base.failures
+        e.ticks = 0  # the end of the policy step, as of `end_tick`
+        e.metrics.failures = self._base.failures
         judge_step(self.step_end().judge)
         if self._orders is not None:
             follow_timetable(self._follower(self._orders))
@@ -184,6 +184,6 @@ class ControlledEnv(CommandedEnv):
         if not (wrench.any() or qfrc_applied[:6].any()):
             return
         soft_root_force(self.simulation.state_arrays, wrench, qfrc_applied)
-        metrics = self.episode.metrics
-        for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
-            metrics[metric] = max(metrics[metric], float(np.linalg.norm(part)))
+        m = self.episode.metrics
+        m.root_force = max(m.root_force, float(np.linalg.norm(wrench[:3])))
+        m.root_moment = max(m.root_moment, float(np.linalg.norm(wrench[3:])))

@@ -11,6 +11,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.callbacks import CallbackAddress, call_back
 from poise.envs.compiled.calls import call, run
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.simulation import physics_step
 from poise.envs.sensing.realism import Realism
@@ -25,7 +26,6 @@ from .policy_step import (
     set_targets,
 )
 
-OPEN, CALM, AUTHORITY, TOOK, OPENS, CLOSES, ENTRIES = range(7)  # of `HandOver.memory`
 MISPLACED = 0.02  # [rad] by which joints and tilt together may be biased, see `uncertain`
 
 
@@ -71,16 +71,27 @@ class HandOverConfig:
         return self.opens, self.closes
 
 
+@dataclass(eq=False)
+class HandOverMemory(Block):
+    """The state of the hand-over in the running episode."""
+
+    open: Mutable[int]  # 1 while servos may take over
+    calm: Mutable[float]  # calm policy steps in a row
+    authority: Mutable[float]  # w, the fraction of the torques that is the servos'
+    took: Mutable[int]  # 1 once they have taken over, until the controller restarts
+    opens: Mutable[float]  # squares of the distances that open and close [m²]
+    closes: Mutable[float]
+
+
 @dataclass(frozen=True, eq=False)
 class HandOver(Block):
-    """The limits of `HandOverConfig`, and what is remembered of the episode."""
+    """The limits of `HandOverConfig`, and the state."""
 
     cos_tilt: float
     speed: float  # squared [m²/s²]
     joint_speed: float  # mean square [rad²/s²]
     calm_steps: float  # policy steps
-    memory: np.ndarray  # (6,) may take over, calm steps in a row, authority w, took over, and the
-    # squares of the distances that open and close [m²]
+    memory: HandOverMemory
     begin: CallbackAddress  # begins a new trial of the controller
 
 
@@ -100,7 +111,7 @@ def is_calm(h: HandOver, step: PolicyStep, distance: float) -> bool:
     `distance` [m²] is the square of the capture point's distance from the reference's.
     """
     s = step.inputs.state
-    if distance > h.memory[CLOSES] or uprightness(step.inputs.robot, s) < h.cos_tilt:
+    if distance > h.memory.closes or uprightness(step.inputs.robot, s) < h.cos_tilt:
         return False
     for i in range(s.contacts.shape[0]):
         if not s.contacts[i]:
@@ -118,24 +129,24 @@ def set_authority(h: HandOver, step: PolicyStep):
     """Set w, the fraction of the torques that is the servos', at the start of a policy step."""
     a, m, action = step.inputs, h.memory, step.episode.action
     distance = capture_error(a.state, a.motion, a.com_offset)
-    m[CALM] = m[CALM] + 1.0 if is_calm(h, step, distance) else 0.0
-    if distance > m[OPENS]:
-        m[OPEN] = 1.0
-    elif m[CALM] >= h.calm_steps:
-        m[OPEN] = 0.0
+    m.calm = m.calm + 1.0 if is_calm(h, step, distance) else 0.0
+    if distance > m.opens:
+        m.open = 1
+    elif m.calm >= h.calm_steps:
+        m.open = 0
     wanted = 2.0 * action[action.shape[0] - 1]
-    m[AUTHORITY] = m[OPEN] * min(max(wanted, 0.0), 1.0)
-    if m[AUTHORITY] > 0.0:
-        m[TOOK] = 1.0
-    elif m[TOOK] > 0.0:
-        m[TOOK] = 0.0
+    m.authority = m.open * min(max(wanted, 0.0), 1.0)
+    if m.authority > 0.0:
+        m.took = 1
+    elif m.took:
+        m.took = 0
         call_back(h.begin)
 
 
 @compiled
 def blend_torques(step: WholeStep):
     """`views.ctrl`: (1 − w) times the controller's torques, `outputs.tau`, and w the servos'."""
-    base, servos, w = step.base, step.servos, step.hand.memory[AUTHORITY]
+    base, servos, w = step.base, step.servos, step.hand.memory.authority
     views, tau = base.world.views, base.outputs.tau
     for i in range(views.ctrl.shape[0]):
         views.ctrl[i] = w * servo_torque(servos, base.world, i)
@@ -147,7 +158,7 @@ def blend_torques(step: WholeStep):
 @compiled
 def whole_tick(step: WholeStep):
     """The control tick of `policy_tick`, with the servos' authority w over the torques."""
-    if step.base.episode.ticks[0] == 0:
+    if step.base.episode.ticks == 0:
         set_authority(step.hand, step.base)
     shared_tick(step)
 
@@ -156,16 +167,16 @@ def whole_tick(step: WholeStep):
 def shared_tick(step: WholeStep):
     """A control tick with the authority that is set."""
     base, hand, e = step.base, step.hand, step.base.episode
-    if e.ticks[0] == 0:
+    if e.ticks == 0:
         first = base.inputs.residual.moved.shape[0]
         aim(step.servos, e.action[first:-1])
-    if hand.memory[AUTHORITY] == 0.0:
+    if hand.memory.authority == 0.0:
         policy_tick(base)
         return
     a, world = base.inputs, base.world
-    if e.ticks[0] == 0:
+    if e.ticks == 0:
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
-    if hand.memory[AUTHORITY] < 1.0:
+    if hand.memory.authority < 1.0:
         set_targets(a)
         call(base.kernel, base.tick)
         promise_motion(base)

@@ -8,8 +8,6 @@ from poise.baselines.balance.stepping.planning.blocks import CaptureTick
 from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.baselines.balance.stepping.tick import capture_tick
 from poise.baselines.controller import Targets
-from poise.baselines.motion.performing.motion_step import MotionStep
-from poise.baselines.motion.performing.tick import perform_tick
 from poise.baselines.walking.tick import walk_tick
 from poise.baselines.walking.walk import Walk
 from poise.baselines.whole_body.momentum_qp import (
@@ -144,18 +142,6 @@ def walking() -> None:
     assert isinstance(walk, Walk)
     tick = walk.around(walk.blocks(env.simulation.state, env.targets))
     address_of(walk_tick, tick)
-    env.bind(tick, NO_KERNEL)
-
-
-def performing() -> None:
-    """The performance of a motion whose feet leave the ground."""
-    env = ResidualBalanceEnv(controller="motion-step", motion="kick", duration=0.1)
-    env.reset(seed=0)
-    controller = env.controller
-    assert isinstance(controller, MotionStep)
-    state, targets = env.simulation.state, env.targets
-    tick = controller.around(controller.blocks(state, controller.resting(state)), targets)
-    address_of(perform_tick, tick)
     env.bind(tick, NO_KERNEL)
 
 

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import Motion, update_targets
+from poise.baselines.balance.references.targets import Motion, Offsets, update_targets
 from poise.baselines.balance.references.tempo import motion_time_of
 from poise.baselines.controller import Outputs, TargetArrays
 from poise.envs.balance.episode import (
-    FAILURES,
-    ROOT_FORCE,
-    ROOT_MOMENT,
     EpisodeArrays,
     StepEnd,
     end_step,
@@ -21,6 +18,7 @@ from poise.envs.compiled.calls import Erased, Kernel, Program, call, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.clock import Clock
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.motor_bus import ask_servo
 from poise.envs.physics.simulation import World, simulate
@@ -51,7 +49,7 @@ class Residual(Block):
     scale: np.ndarray  # (na,) the offset that it moves by 1
     blend: float  # of the way that a policy step goes from the last action to the next
     gate: float  # [m] see `gate_opening`
-    offsets: np.ndarray  # (9,), 13 with steps: see `update_targets`
+    offsets: Offsets  # of which it moves a part
     torque_scale: np.ndarray  # (nu,) [N·m] what the last nu entries add by 1; (0,): they do not
     torques: np.ndarray  # (nu,) [N·m] that they add
 
@@ -60,8 +58,8 @@ class Residual(Block):
 def capture_error(s: StateArrays, motion: Motion, com_offset: float) -> float:
     """d², d the capture point's distance from that of the reference [m]."""
     nj = motion.samples.shape[1] - 6
-    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega[0]
-    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega[0]
+    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega
+    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega
     cos, sin = s.heading[0], s.heading[1]
     dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
     dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
@@ -85,7 +83,7 @@ def set_offsets(r: Residual, s: StateArrays, motion: Motion, com_offset: float, 
         for a in range(first + motors):
             e.action[a] = e.last_action[a] + r.blend * (e.action[a] - e.last_action[a])
     for a in range(first):
-        r.offsets[r.moved[a]] = opened * r.scale[a] * e.action[a]
+        r.offsets.values[r.moved[a]] = opened * r.scale[a] * e.action[a]
     for i in range(motors):
         r.torques[i] = opened * r.torque_scale[i] * e.action[first + i]
 
@@ -103,7 +101,7 @@ class TargetInputs(Block):
 
     robot: RobotArrays
     state: StateArrays
-    clock: np.ndarray  # (1,) int
+    clock: Clock
     motion: Motion
     com_offset: float  # [m]
     residual: Residual
@@ -118,7 +116,7 @@ def set_targets(a: TargetInputs):
     """Targets of this tick."""
     if a.observes_push:
         observe_push(a.push, a.robot, a.state, a.period)
-    now, motion = a.clock[0] * a.robot.timestep, a.motion
+    now, motion = a.clock.steps * a.robot.timestep, a.motion
     time = motion_time_of(motion.pace, a.state, a.targets.com, motion.knots[0], now)
     update_targets(a.robot, a.state, motion, time, a.com_offset, a.residual.offsets, a.targets)
 
@@ -153,7 +151,7 @@ def promise_motion(step: PolicyStep):
 def ask_motors(step: PolicyStep):
     """Where the motors are real, let them run the controller's servos, if it has any."""
     bus, world, o = step.world.bus, step.world, step.outputs
-    bus.servoed[0] = 0
+    bus.servoed = 0
     if bus.q.shape[0] > 0 and o.target.shape[0] > 0:
         for i in range(world.views.ctrl.shape[0]):
             j = world.robot.motor_dofs[i] - 6
@@ -166,7 +164,7 @@ def policy_tick(step: PolicyStep):
     """The controller, held for `substeps` physics steps; `ticks` calls are a policy step."""
     a, world, e, o = step.inputs, step.world, step.episode, step.outputs
     robot, views, s = world.robot, world.views, world.state
-    if e.ticks[0] == 0:
+    if e.ticks == 0:
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
     set_targets(a)
     call(step.kernel, step.tick)
@@ -178,8 +176,8 @@ def policy_tick(step: PolicyStep):
     if o.soft_root:
         m, w = e.metrics, o.root_wrench
         soft_root_force(s, w, views.qfrc_applied)
-        m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
-        m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
+        m.root_force = max(m.root_force, np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
+        m.root_moment = max(m.root_moment, np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
     record_tick(robot, s.qvel, views.ctrl, step.substeps * robot.timestep, e)
     simulate(world, step.substeps)
     run(step.estimate)
@@ -190,10 +188,10 @@ def policy_tick(step: PolicyStep):
 def end_tick(step: PolicyStep):
     """Count the tick; the last one ends the policy step."""
     e = step.episode
-    e.ticks[0] += 1
-    if e.ticks[0] < step.ticks:
+    e.ticks += 1
+    if e.ticks < step.ticks:
         return
-    e.ticks[0] = 0
+    e.ticks = 0
     copy_into(step.outputs.root_wrench, e.root_wrench)
-    e.metrics[FAILURES] = step.outputs.failures[0]
+    e.metrics.failures = step.outputs.failures
     end_step(step.end)

@@ -11,7 +11,7 @@ from poise.baselines.allowance import allowing, named
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion, command_options
 from poise.baselines.balance.references.targets import motion_arrays
-from poise.baselines.balance.references.tempo import TIME, Pace, Tempo
+from poise.baselines.balance.references.tempo import Pace, Tempo
 from poise.baselines.controller import Controller, Targets, as_base_controller
 from poise.baselines.registry import (
     ControllerConfig,
@@ -30,6 +30,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.sensing.push_force import forget_pushes, push_force
+from poise.envs.sensing.realism import Realism
 
 from .controlled import ControlledEnv
 from .policy_step import TargetInputs, set_targets
@@ -78,7 +79,7 @@ class ResidualBalanceEnv(ControlledEnv):
     Observation: <observation>
 
     The push is not observed. `observation: {extra: [push_force, push_mean]}` adds the force that
-    is estimated from CoM and CoP, and its leaky mean. The reference is that of `motion`.
+    is estimated from momentum and CoP, and its leaky mean. The reference is that of `motion`.
 
     A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the
     option "command" of `reset` sets it from the start on: a mapping with `ahead`, `left` [m/s] and
@@ -172,7 +173,7 @@ class ResidualBalanceEnv(ControlledEnv):
     def motion_time(self) -> float:
         """Time of the motion now; that since the reset unless it waits [s]."""
         pace = self._motion.pace
-        return float(pace.memory[TIME]) if pace.waits else self.simulation.time
+        return pace.time if pace.waits else self.simulation.time
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; robot and motion are shared.
@@ -210,6 +211,24 @@ class ResidualBalanceEnv(ControlledEnv):
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
 
+    def stand_in(self, level: Realism) -> str | None:
+        """Return the controller that runs in place of the named one at a level, or None.
+
+        It is the one that the named controller's `uncertain` names. Where it runs in an episode,
+        `info["stand_in"]` names it.
+        """
+        config = getattr(self._known, "config", None)
+        if config is not None and is_replaced(config, level):
+            return str(config.uncertain)
+        return None
+
+    def info(self) -> dict[str, Any]:
+        """The entries of `BalanceEnv`, and the controller that runs in place of the named one."""
+        info = super().info()
+        if self._controller is self._stand_in:
+            info["stand_in"] = self.stand_in(self.realism)
+        return info
+
     def _suit_level(self) -> None:
         """Choose the controller for this realism level, see `where_uncertain`."""
         if not any(self._controller is own for own in (self._known, self._stand_in)):
@@ -235,7 +254,7 @@ class ResidualBalanceEnv(ControlledEnv):
             options = {**options, "command": command_options(self.motion.commands)}
         self._begin_walk(options)
         self._motion.pace.clear()
-        self._offsets[:] = 0.0
+        self._offsets.clear()
         self._residual.torques[:] = 0.0
         forget_pushes(self._push_force)
         set_targets(self._target_inputs())

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import MOMENTUM_X, MOMENTUM_Y, STEPS, TARGETS
+from poise.baselines.balance.references.targets import NAMES, STEPS, TARGETS, no_offsets
 from poise.envs.balance.mdp.observation import Term
 from poise.envs.compiled.memory import guarded_zeros
 
@@ -96,14 +96,14 @@ def make_residual(
     """
     scale = np.array(list(scales.entries().values()))
     moved = np.flatnonzero(scale)
-    scale[MOMENTUM_X : MOMENTUM_Y + 1] *= momentum
+    scale[[NAMES.index("momentum_x"), NAMES.index("momentum_y")]] *= momentum
     blend = 1.0 if lag.smoothing == 0.0 else -np.expm1(-policy_period / lag.smoothing)
     return Residual(
         moved=moved,
         scale=scale[moved],
         blend=float(blend),
         gate=lag.gate,
-        offsets=guarded_zeros(len(scale)),
+        offsets=no_offsets(),
         torque_scale=scales.torque * torque_limit if scales.torque > 0.0 else np.zeros(0),
         torques=guarded_zeros(len(torque_limit) if scales.torque > 0.0 else 0),
     )

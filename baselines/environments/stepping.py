@@ -13,12 +13,11 @@ from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .residual import ResidualBalanceEnv
 from .scales import StepScales
-from .terms import REPORTED, STEP_TERMS, StepReporter, StepView, report_steps
+from .terms import STEP_TERMS, StepReport, StepReporter, StepView, report_steps
 
 
 class ResidualStepEnv(ResidualBalanceEnv):
@@ -65,7 +64,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
         controller: str | Path | Mapping | ControllerConfig | Controller = "capture-step",
         **arguments: Any,
     ):
-        self._step_report = guarded_zeros(REPORTED)
+        self._step_report = StepReport.allocate()
         super().__init__(robot, config, controller=controller, **arguments)
 
     def _accept(self, controller: Controller, base: BaseController) -> None:
@@ -74,14 +73,14 @@ class ResidualStepEnv(ResidualBalanceEnv):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         super()._accept(controller, base)
         self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
-        self._offsets = stepper.offsets.values  # one array is both
+        self._offsets = stepper.offsets
         self._residual = replace(self._residual, offsets=self._offsets)
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
         return (self._step_report,) if kind is StepView else super()._readings(kind)
 
     def _observe(self) -> None:
-        self._step_report[:] = self.stepper.stepping().entries()
+        self._step_report.fill(self.stepper.stepping())
         super()._observe()
 
     def _reports(self, tick: Any) -> list[tuple[Callable[..., None], Block]]:

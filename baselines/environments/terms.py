@@ -1,11 +1,12 @@
 """Terms of a controller's motion and steps, in addition to those of `envs.balance.mdp.terms`."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from poise.baselines.balance.references.targets import Motion
-from poise.baselines.balance.references.tempo import TIME
+from poise.baselines.balance.stepping.controller import Stepping
 from poise.baselines.balance.stepping.planning.blocks import StepMemory
 from poise.baselines.balance.stepping.planning.swing import Swing
 from poise.baselines.balance.stepping.planning.swing import time_left as remaining_time
@@ -13,6 +14,7 @@ from poise.envs.balance.mdp.observation import GROUND, SPACE, Terms, View
 from poise.envs.balance.mdp.terms import TERMS, put_local
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.sensing.push_force import PushForce
 
 
@@ -37,9 +39,9 @@ MOTION_TERMS = Terms(TERMS, MotionView)  #: by name; those of every environment 
 def motion_phase(t: MotionView):
     motion, v = t.motion, t.seen
     begin, end = motion.knots[0], motion.knots[-1]
-    now = v.clock[0] * v.robot.timestep
+    now = v.clock.steps * v.robot.timestep
     if motion.pace.waits:
-        now = motion.pace.memory[TIME]
+        now = motion.pace.time
     over = (now - begin) / (end - begin)
     over = over % 1.0 if motion.loop else min(max(over, 0.0), 1.0)
     v.out[0], v.out[1] = np.sin(2.0 * np.pi * over), np.cos(2.0 * np.pi * over)
@@ -71,9 +73,22 @@ def push_mean(t: ForceView):
     put_local(v.state, mean[0], mean[1], 0.02 * v.scales.weight, v.out)
 
 
-# entries of the report of a controller's steps, see `Stepping.entries`
-STEPS, FOOT, FOOTHOLD, PHASE, REMAINING, SINCE = 0, 1, 2, 4, 5, 6
-REPORTED = 7
+@dataclass(eq=False)
+class StepReport(Block):
+    """What is observed of a controller's steps, see `Stepping`."""
+
+    steps: Mutable[int]  # begun
+    foot: Mutable[int]  # that swings; −1: none
+    foothold: Annotated[np.ndarray, 2]  # of that foot [m]
+    phase: Mutable[float]  # fraction of its swing that is over
+    remaining: Mutable[float]  # [s] until its touchdown
+    since: Mutable[float]  # the last touchdown [s]
+
+    def fill(self, steps: Stepping) -> None:
+        """Report the steps of a controller that is called from Python."""
+        self.steps, self.foot, self.phase = steps.steps, steps.foot, steps.phase
+        self.foothold[:] = steps.foothold
+        self.remaining, self.since = steps.remaining, steps.since
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +96,7 @@ class StepView(Block):
     """The block of a term about steps: what it reads, and the place that it fills."""
 
     seen: View
-    report: np.ndarray  # (7,) see `Stepping.entries`
+    report: StepReport
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,19 +105,19 @@ class StepReporter(Block):
 
     memory: StepMemory
     swing: Swing
-    report: np.ndarray  # (7,)
+    report: StepReport
 
 
 @compiled
 def report_steps(t: StepReporter):
-    """Fill `report` as `Stepping.entries` does."""
-    m, w, report = t.memory, t.swing, t.report
-    report[STEPS], report[FOOT], report[SINCE] = m.steps[0], -1.0, m.clock[0]
-    report[PHASE], report[REMAINING] = 0.0, 0.0
-    if m.swinging[0]:
-        report[FOOT], report[SINCE] = m.foot[0], 0.0
-        report[FOOTHOLD], report[FOOTHOLD + 1] = w.foothold[0], w.foothold[1]
-        report[PHASE], report[REMAINING] = w.time[0] / w.duration[0], remaining_time(w)
+    """Fill `report` as `StepReport.fill` does."""
+    m, w, r = t.memory, t.swing, t.report
+    r.steps, r.foot, r.since = m.steps, -1, m.clock
+    r.phase, r.remaining = 0.0, 0.0
+    if m.swinging:
+        r.foot, r.since = m.foot, 0.0
+        r.foothold[0], r.foothold[1] = w.foothold[0], w.foothold[1]
+        r.phase, r.remaining = w.time / w.duration, remaining_time(w)
 
 
 STEP_TERMS = Terms(FORCE_TERMS, StepView)  #: by name; those of every environment come first
@@ -111,7 +126,7 @@ STEP_TERMS = Terms(FORCE_TERMS, StepView)  #: by name; those of every environmen
 @compiled
 def put_from_stance(t: StepView, x: float, y: float):
     """The point (x, y) of the ground from the stance sole, heading frame [0.5 h]; 0 without one."""
-    v, foot = t.seen, int(t.report[FOOT])
+    v, foot = t.seen, t.report.foot
     v.out[:] = 0.0
     if foot >= 0:
         stance, half = v.state.sole_point[1 - foot], 0.5 * v.scales.height
@@ -121,27 +136,27 @@ def put_from_stance(t: StepView, x: float, y: float):
 @STEP_TERMS.add("feet", "1", "1 where the foot swings, else 0", "feet")
 def swing(t: StepView):
     for i in range(t.seen.out.shape[0]):
-        t.seen.out[i] = 1.0 if int(t.report[FOOT]) == i else 0.0
+        t.seen.out[i] = 1.0 if t.report.foot == i else 0.0
 
 
 @STEP_TERMS.add(("fraction",), "1", "fraction of the swing that is over", "number")
 def phase(t: StepView):
-    t.seen.out[0] = t.report[PHASE]
+    t.seen.out[0] = t.report.phase
 
 
 @STEP_TERMS.add(("t",), "1/ω", "until touchdown is planned", "number")
 def time_left(t: StepView):
-    t.seen.out[0] = t.seen.scales.omega * t.report[REMAINING]
+    t.seen.out[0] = t.seen.scales.omega * t.report.remaining
 
 
 @STEP_TERMS.add(("t",), "1/ω", "since the last touchdown", "number")
 def since(t: StepView):
-    t.seen.out[0] = t.seen.scales.omega * t.report[SINCE]
+    t.seen.out[0] = t.seen.scales.omega * t.report.since
 
 
 @STEP_TERMS.add(("count",), "1", "steps begun", "number")
 def steps(t: StepView):
-    t.seen.out[0] = t.report[STEPS]
+    t.seen.out[0] = t.report.steps
 
 
 @STEP_TERMS.add(GROUND, "0.5 h", "first sole from the second", "between feet")
@@ -153,7 +168,7 @@ def feet(t: StepView):
 
 @STEP_TERMS.add(SPACE, "0.5 h", "swinging sole from the stance sole, 0 if both are down", "vector")
 def swing_foot(t: StepView):
-    v, foot = t.seen, int(t.report[FOOT])
+    v, foot = t.seen, t.report.foot
     moving = v.state.sole_point[max(foot, 0)]
     put_from_stance(t, moving[0], moving[1])
     if foot >= 0:
@@ -162,7 +177,7 @@ def swing_foot(t: StepView):
 
 @STEP_TERMS.add(GROUND, "0.5 h", "foothold from the stance sole, 0 if both are down", "vector")
 def foothold(t: StepView):
-    put_from_stance(t, t.report[FOOTHOLD], t.report[FOOTHOLD + 1])
+    put_from_stance(t, t.report.foothold[0], t.report.foothold[1])
 
 
 @STEP_TERMS.add(GROUND, "0.5 h", "ξ from the stance sole, 0 if both are down", "vector")

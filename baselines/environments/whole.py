@@ -19,17 +19,13 @@ from poise.envs.balance.servos import ServoConfig, make_servos
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.callbacks import Callback
 from poise.envs.compiled.calls import CompiledStep, address_of
-from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 
 from .hand_over import (
-    AUTHORITY,
-    CLOSES,
-    ENTRIES,
-    OPENS,
     HandOver,
     HandOverConfig,
+    HandOverMemory,
     WholeStep,
     whole_tick,
 )
@@ -85,7 +81,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         self.hand_over = build(HandOverConfig, given, "hand_over")
         prepare("whole")
         self.servo_config = servo_config(servos)
-        self._memory = guarded_zeros(ENTRIES)
+        self._memory = HandOverMemory.allocate()
         self._callback = Callback(self._restart_controller)
         super().__init__(robot, config, controller=controller, **arguments)
         self.servos = make_servos(self.robot, self.servo_config)
@@ -102,7 +98,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
     @property
     def authority(self) -> float:
         """w, the fraction of the torques that was the servos' in the last policy step."""
-        return float(self._memory[AUTHORITY])
+        return self._memory.authority
 
     def arguments(self) -> dict[str, Any]:
         own = {"servos": self.servo_config, "hand_over": self.hand_over}
@@ -119,8 +115,8 @@ class ResidualWholeEnv(ResidualBalanceEnv):
     def _begin(self, options: Mapping[str, Any]) -> None:
         super()._begin(options)
         opens, closes = self.hand_over.distances(self.realism)
-        self._memory[:] = 0.0
-        self._memory[OPENS], self._memory[CLOSES] = opens**2, closes**2
+        self._memory.clear()
+        self._memory.opens, self._memory.closes = opens**2, closes**2
         self._callback.error = None
 
     def _restart_controller(self) -> None:
@@ -129,7 +125,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         assert isinstance(controller, CompiledController)  # by `_accept`
         failures = controller.failures
         controller.reset(self.state_source.state)
-        controller.outputs().failures[0] = failures
+        controller.outputs().failures = failures
 
     def check(self) -> None:
         """See `BalanceEnv`; of the controller, and of its new beginning."""

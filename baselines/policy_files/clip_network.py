@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .motion.clips import FRAMES, FrameClip, Frames, make_clip
+from .motion.clips import FRAMES, ClipFrames, FrameClip, make_clip
 from .motion.config import TIME_STEP
 from .motion.track import USUAL_ANCHOR
 from .networks import Network, OnnxNetwork
@@ -47,7 +47,7 @@ def network_clip(
     places, quats = places[:, :3], quats[:, :4]
     if pose == ANCHOR:
         places, quats = _roots(robot, joints, anchor or USUAL_ANCHOR, q, places, quats)
-    return make_clip(source, robot, joints, period, Frames(1.0 / period, places, quats, q, v))
+    return make_clip(source, robot, joints, period, ClipFrames(1.0 / period, places, quats, q, v))
 
 
 def _length(network: OnnxNetwork, wanted: Sequence[str]) -> int:

@@ -121,7 +121,7 @@ class JointLaw:
 
 
 @dataclass(frozen=True)
-class Memory:
+class NetworkMemory:
     """What a network gives in a step and is given in the next; zero when a trial starts.
 
     Attributes:
@@ -249,7 +249,7 @@ class PolicyFileConfig:
     )
     law: dict[str, JointLaw] = field(default_factory=dict, metadata={"omit": "default"})
     outputs: dict[str, str | int] = field(default_factory=dict, metadata={"omit": "default"})
-    memory: tuple[Memory, ...] = _new(())
+    memory: tuple[NetworkMemory, ...] = _new(())
     batch: bool = _new(True)
     warm_up: int = _new(0, min=0, max=10_000)
     warm_up_with: Literal["first", "zeros"] = _new("first")

@@ -21,6 +21,7 @@ from poise.envs.compiled.callbacks import Callback, CallbackAddress, call_back
 from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -37,8 +38,8 @@ from .observations import Observer, follows_commands, tracks_motion
 from .terms import Seen, roll_pitch
 
 
-@dataclass(frozen=True, eq=False)
-class Servos(Block):
+@dataclass(eq=False)
+class PolicyServos(Block):
     """PD control of all joints (nj)."""
 
     stiffness: np.ndarray  # (nj,) [N·m/rad]
@@ -46,7 +47,7 @@ class Servos(Block):
     limit: np.ndarray  # (nj,) [N·m]
     target: np.ndarray  # (nj,) [rad]
     tau: np.ndarray  # (nj,) [N·m]
-    ticks: np.ndarray  # (1,) int, since the reset
+    ticks: Mutable[int]  # since the reset
     every: int  # ticks of a policy step
 
 
@@ -55,20 +56,20 @@ class PolicyTick(Block):
     """All that a control tick works on."""
 
     state: StateArrays
-    servos: Servos
+    servos: PolicyServos
     ask: CallbackAddress  # calls the policy for new targets
 
 
 @compiled
-def policy_tick(t: PolicyTick):
+def network_tick(t: PolicyTick):
     """τ = K (q* − q) − D q̇ within the limits; q* is new at the first tick of a policy step.
 
     q and q̇ are what the motors' own encoders read: they are not late where the state is.
     """
     servos, s = t.servos, t.state
-    if servos.ticks[0] % servos.every == 0:
+    if servos.ticks % servos.every == 0:
         call_back(t.ask)
-    servos.ticks[0] += 1
+    servos.ticks += 1
     for a in range(servos.tau.shape[0]):
         servos.tau[a] = pd_torque(
             servos.stiffness[a], servos.damping[a], servos.limit[a],
@@ -115,11 +116,11 @@ class PolicyFile(CompiledController):
         nj = len(self.joints.target)
         limit = np.zeros(nj)
         limit[self.arrays.motor_dofs - 6] = self.arrays.torque_limit
-        self._servos = Servos(
+        self._servos = PolicyServos(
             self.joints.stiffness.copy(), self.joints.damping.copy(), limit,
-            self.joints.target.copy(), guarded_zeros(nj), guarded_zeros(1, dtype=np.int64), every,
+            self.joints.target.copy(), guarded_zeros(nj), 0, every,
         )  # fmt: skip
-        self._failures, self._no_wrench = guarded_zeros(1, dtype=np.int64), guarded_zeros(6)
+        self._no_wrench = guarded_zeros(6)
         self._callback = Callback(self._ask)
         self._state: RobotState | None = None
         self._tick: PolicyTick | None = None
@@ -175,13 +176,13 @@ class PolicyFile(CompiledController):
         for name in ("stiffness", "damping", "target"):
             getattr(self._servos, name)[:] = getattr(self.joints, name)
         self._servos.tau[:] = 0.0
-        self._servos.ticks[0] = 0
+        self._servos.ticks = 0
         self._callback.error = None
 
     def _ask(self) -> None:
         """New targets from the policy."""
         assert self._state is not None
-        now = self._servos.ticks[0] * self.period
+        now = self._servos.ticks * self.period
         index, state = self.joints.index, self._state
         command = np.array(self.config.command) if self.orders is None else self.orders[:3]
         phase = self._phase(now, bool(np.any(command)))
@@ -190,11 +191,11 @@ class PolicyFile(CompiledController):
             command, phase, phase + self._legs, self.motion,
         )  # fmt: skip
         if self.motion is not None:
-            self.motion.update(state, int(self._servos.ticks[0]) // self._servos.every)
+            self.motion.update(state, self._servos.ticks // self._servos.every)
         observations = self.observer.observe(seen)
         if not all(np.all(np.isfinite(each)) for each in observations.values()):
             return  # the simulation diverged, which is a fall
-        if self._servos.ticks[0] == 0:
+        if self._servos.ticks == 0:
             self.warm_up(observations)
         answer = self.network.act(observations)
         for role, values in answer.items():
@@ -228,7 +229,7 @@ class PolicyFile(CompiledController):
         return 2.0 * np.pi * (since / self.config.phase % 1.0)
 
     def tick(self, state: RobotState) -> PolicyTick:
-        """The block that `policy_tick` works on, for `state`."""
+        """The block that `network_tick` works on, for `state`."""
         self._state = state
         known = self._tick
         if known is None or known.state is not state.arrays:
@@ -237,7 +238,7 @@ class PolicyFile(CompiledController):
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next physics step."""
-        policy_tick(self.tick(state))
+        network_tick(self.tick(state))
         self.check()
         return self._servos.tau[self.arrays.motor_dofs - 6]
 
@@ -249,14 +250,14 @@ class PolicyFile(CompiledController):
         self, state: RobotState, targets: Targets
     ) -> tuple[Kernel[PolicyTick], PolicyTick]:
         tick = self.tick(state)
-        return address_of(policy_tick, tick), tick
+        return address_of(network_tick, tick), tick
 
     def outputs(self) -> Outputs:
         s = self._servos
         servos = {"target": s.target, "stiffness": s.stiffness, "damping": s.damping}
-        return Outputs(s.tau, self._no_wrench, self._failures, False, **servos)
+        return Outputs(s.tau, self._no_wrench, 0, False, **servos)
 
-    def gains(self) -> Servos:
+    def gains(self) -> PolicyServos:
         """See `CompiledController`; raises what went wrong in the step before."""
         self.check()
         return self._servos

@@ -16,7 +16,7 @@ HOW = "needs the package onnx: pip install onnx"
 
 
 @dataclass(frozen=True, eq=False)
-class Layers:
+class NetworkLayers:
     """A network: x₀ = (o − mean) / scale, x_k = ELU(W_k x + b_k), and W x + b at the end."""
 
     mean: np.ndarray  # (n,)
@@ -33,7 +33,7 @@ class Layers:
         return x @ self.weights[-1].T + self.biases[-1]
 
 
-def read_layers(path: Path) -> Layers:
+def read_layers(path: Path) -> NetworkLayers:
     """The layers of an ONNX file: Sub and Div, or neither; then Gemm and Elu in turn, as mjlab's.
 
     Of TorchScript, which the user must have allowed, its matrices in turn, with ELU between them.
@@ -43,7 +43,7 @@ def read_layers(path: Path) -> Layers:
     return _script_layers(path) if is_script(path) else _onnx_layers(path)
 
 
-def _script_layers(path: Path) -> Layers:
+def _script_layers(path: Path) -> NetworkLayers:
     """What TorchScript calls weight and bias, in turn; and mean and std of what it is given.
 
     Nothing tells what lies between them, so it is tried whether they do what it does.
@@ -62,7 +62,7 @@ def _script_layers(path: Path) -> Layers:
     n = weights[0].shape[1]
     mean, scale = (np.ravel(each[0]) if each else empty for each, empty in
                    ((found["mean"], np.zeros(n)), (found["std"], np.ones(n))))  # fmt: skip
-    layers = Layers(mean, scale, weights, biases)
+    layers = NetworkLayers(mean, scale, weights, biases)
     tried = mean + scale * np.random.default_rng(0).normal(size=(8, n))
     with torch.inference_mode():
         expected = module(torch.from_numpy(tried).float()).double().numpy()
@@ -71,7 +71,7 @@ def _script_layers(path: Path) -> Layers:
     return layers
 
 
-def _onnx_layers(path: Path) -> Layers:
+def _onnx_layers(path: Path) -> NetworkLayers:
     try:
         import onnx
     except ImportError:
@@ -91,7 +91,7 @@ def _onnx_layers(path: Path) -> Layers:
     mean, scale = np.zeros(weights[0].shape[1]), np.ones(weights[0].shape[1])
     if normalised:
         mean, scale = (arrays[node.input[1]].ravel() for node in list(graph.node)[:2])
-    return Layers(mean, scale, weights, biases)
+    return NetworkLayers(mean, scale, weights, biases)
 
 
 def _matrix(node: object, arrays: dict[str, np.ndarray]) -> np.ndarray:

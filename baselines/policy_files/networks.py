@@ -13,8 +13,8 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.extras import needing
 from poise.configs.reading import read_bytes
 
-from .config import Memory, PolicyFileConfig
-from .onnx.bounds import Clocked
+from .config import NetworkMemory, PolicyFileConfig
+from .onnx.bounds import RunOptions
 from .onnx.files import BYTES
 
 MEMORY = 10_000_000  # numbers that a network may remember, of each kind
@@ -96,7 +96,7 @@ class OnnxNetwork:
         }
         self._roles = {role: _output(output, outputs, f"outputs.{role}", path)
                        for role, output in {"action": 0, **config.outputs}.items()}  # fmt: skip
-        self._clocked = Clocked()
+        self._clocked = RunOptions()
 
     def __reduce__(self) -> tuple[object, ...]:
         return OnnxNetwork, (self.path, self.config), {"_memory": self._memory}
@@ -168,7 +168,7 @@ def _times(shape: Sequence[object]) -> str:
 
 
 def _pairs(
-    inputs: Mapping[str, Any], outputs: Sequence[str], said: Sequence[Memory], path: Path
+    inputs: Mapping[str, Any], outputs: Sequence[str], said: Sequence[NetworkMemory], path: Path
 ) -> dict[str, str]:
     """Input → the output that it is taken from in the next step."""
     pairs = {name: after for name in inputs for after in _after(name) if after in outputs}

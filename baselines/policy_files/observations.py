@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError
 
 from .config import ObservationTerm, PolicyFileConfig
 from .motion.track import MOTION_SIZES, MOTION_TERMS, PER_JOINT
-from .terms import COMMANDS, SIZES, KnownTerms, Place, Seen, Term, meaning
+from .terms import COMMANDS, SIZES, KnownTerms, PolicyTerm, Seen, TermPlace, meaning
 
 
 def follows_commands(config: PolicyFileConfig) -> bool:
@@ -66,7 +66,7 @@ class Observer:
         return "; ".join(f"{side.size} numbers{' for ' if name else ''}{name} ({side})"
                          for name, side in self._inputs.items())  # fmt: skip
 
-    def places(self) -> dict[str, list[Place]]:
+    def places(self) -> dict[str, list[TermPlace]]:
         """Input → where its terms lie, in their order."""
         return {name: list(side.places(0, 0)) for name, side in self._inputs.items()}
 
@@ -102,7 +102,7 @@ class _Side:
     def __str__(self) -> str:
         return ", ".join(map(str, self.parts))
 
-    def places(self, start: int, age: int) -> Iterator[Place]:
+    def places(self, start: int, age: int) -> Iterator[TermPlace]:
         """Where their terms lie, from `start` on, of so many steps ago."""
         for part in self.parts:
             yield from part.places(start, age)
@@ -122,10 +122,10 @@ class _Part:
 
     def __init__(self, described: ObservationTerm, field: str, known: KnownTerms, inside: str = ""):
         self.described = described
-        self.inner: _Side | Term = (
+        self.inner: _Side | PolicyTerm = (
             _Side(described.frame, inside or f"{field}.frame", known)
             if described.frame
-            else Term(described, field, known)
+            else PolicyTerm(described, field, known)
         )
         self.kept: deque[np.ndarray] = deque(maxlen=described.history + described.lag)
         self.size: int = self.inner.size * described.history
@@ -135,7 +135,7 @@ class _Part:
         name = f"({self.inner})" if self.described.frame else str(self.inner)
         return name + (f" × {count}" if count > 1 else "")
 
-    def places(self, start: int, age: int) -> Iterator[Place]:
+    def places(self, start: int, age: int) -> Iterator[TermPlace]:
         """Where it lies, step by step."""
         steps = range(self.described.lag, self.described.lag + self.described.history)
         for step in steps if self.described.newest_first else reversed(steps):

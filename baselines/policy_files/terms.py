@@ -113,7 +113,7 @@ def meaning(term: ObservationTerm) -> str:
     return ALIASES.get(term.term, term.term)
 
 
-class Place(NamedTuple):
+class TermPlace(NamedTuple):
     """Where a term lies in an observation, and how many policy steps ago it was so."""
 
     term: ObservationTerm
@@ -130,7 +130,7 @@ class KnownTerms(NamedTuple):
     source: str
 
 
-class Term:
+class PolicyTerm:
     """One term in one step."""
 
     def __init__(self, described: ObservationTerm, field: str, known: KnownTerms):
@@ -211,9 +211,9 @@ class Term:
     def _wrong(self, field: str, problem: str) -> ConfigError:
         return ConfigError(problem, source=self._source, field=f"{self._field}.{field}")
 
-    def places(self, start: int, age: int) -> Iterator[Place]:
+    def places(self, start: int, age: int) -> Iterator[TermPlace]:
         """Where it lies."""
-        yield Place(self.described, start, self.size, age)
+        yield TermPlace(self.described, start, self.size, age)
 
     def now(self, seen: Seen) -> np.ndarray:
         """(size,) its numbers."""

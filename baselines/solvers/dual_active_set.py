@@ -17,7 +17,7 @@ from .scaled_rows import (
     INVALID,
     ITERATION_LIMIT,
     SOLVED,
-    advance,
+    advance_slacks,
     most_violated,
     scale_rows,
 )
@@ -72,7 +72,7 @@ def _correct(
     """Recomputes s from x and takes out of both what rounding has left on the active rows."""
     for _ in range(3):
         s[:] = 0.0
-        advance(Ct, x, 1.0, s, product)
+        advance_slacks(Ct, x, 1.0, s, product)
         worst = 0.0
         for k in range(q):
             e[k] = bound[k] - sign[k] * s[active[k]]
@@ -173,7 +173,7 @@ def solve_dual(
     if not start < np.inf:
         return INVALID
     s[:] = 0.0
-    advance(Ct, x, 1.0, s, work)
+    advance_slacks(Ct, x, 1.0, s, work)
 
     q, equalities = np.int64(0), np.int64(0)  # a literal 0 would compile what it is handed to twice
     next_row, checks, skipped = 0, 0, False
@@ -237,7 +237,7 @@ def solve_dual(
                     blocking, t = -1, violation / free
                 for j in range(n):
                     x[j] += t * z[j]
-                advance(Ct, z, t, s, work)
+                advance_slacks(Ct, z, t, s, work)
             for k in range(q):
                 mult[k] -= t * r[k]
             row_mult += t

@@ -55,7 +55,7 @@ def scale_rows(
 
 
 @compiled
-def advance(Ct: np.ndarray, z: np.ndarray, t: float, s: np.ndarray, product: np.ndarray):
+def advance_slacks(Ct: np.ndarray, z: np.ndarray, t: float, s: np.ndarray, product: np.ndarray):
     """s += t Cz."""
     n, p = Ct.shape
     for i in range(p):

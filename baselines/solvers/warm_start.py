@@ -5,7 +5,7 @@ import numpy as np
 from poise.envs.compiled.jit import compiled
 
 from .factors import append, lift, remove, solve_upper, split
-from .scaled_rows import advance
+from .scaled_rows import advance_slacks
 
 RESUMED = 1e-12  # squared sine (metric of H⁻¹) below which a row depends on the active ones
 
@@ -76,5 +76,5 @@ def resume(
         if k >= equalities:
             lower[active[k]], upper[active[k]] = -np.inf, np.inf
     s[:] = 0.0
-    advance(Ct, x, 1.0, s, work)
+    advance_slacks(Ct, x, 1.0, s, work)
     return q

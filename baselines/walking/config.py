@@ -71,6 +71,10 @@ class GaitConfig:
     # until this fraction of the swing the foot stays as high as it is at `swing.lift`, over its own
     # ground and the stance sole's; 0: it comes down once it is up, and only the latter counts
     lower: float = number(0.0, min=0.0, max=0.95, omit="default")
+    # the miss of ξ at touchdown, the CoP where it brakes most, from which the steps that catch a
+    # fall take over; 0: never. It walks again once both soles have been down for `calm_time`
+    catch: float = number(0.0, "h", min=0.0, omit="default")
+    calm_time: float = number(2.0, "1/ω", min=0.0, omit="default")
     torque_rate_limit: float = number(0.6, above=0.0)  # as in `CaptureStepConfig`
     root_accel: float = number(60.0, "ω²", above=0.0)
     swing_accel: float = number(14.0, "ω²", above=0.0)

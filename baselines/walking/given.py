@@ -79,11 +79,11 @@ def _length(surface: Surface) -> float:
 
 def allocate_treads(config: TreadConfig, surfaces: list[Surface], units: Units) -> Treads:
     """The block of the surfaces on which steps are given."""
-    c = config
+    numbers = in_si(
+        config, units, "clearance", "margin", "least_step", "approach", "highest", "hold_up",
+        "hold_down", "rise", "rise_down", "lower", "lower_down", "arrive", "lean", "lean_from",
+    )  # fmt: skip
     return Treads.allocate(
-        **in_si(Treads, c, units),
+        **numbers,
         surfaces=surface_arrays(surfaces),
-        hold=np.array([c.hold_up, c.hold_down]),
-        rise=np.array([c.rise, c.rise_down]),
-        lower=np.array([c.lower, c.lower_down]),
     )

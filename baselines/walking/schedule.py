@@ -9,8 +9,10 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
-from poise.envs.compiled.block import Block, Integer
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
+from poise.envs.physics.clock import Clock
 from poise.envs.physics.pushes.sampler import Range
 
 from .planner.command import ENTRIES, GaitCommand
@@ -136,13 +138,13 @@ def _parse_one(item: object, source: str) -> TimedCommand:
     return build(TimedCommand, {str(k): to_dict(v) for k, v in data.items()}, source)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Timetable(Block):
     """The commands of an episode as compiled code reads them."""
 
     start: Annotated[np.ndarray, MOST_COMMANDS]  # [s]; infinite behind the last one
     commands: Annotated[np.ndarray, MOST_COMMANDS, ENTRIES]  # see `GaitCommand.array`
-    following: Integer  # the row that comes next
+    following: Mutable[int]  # the row that comes next
 
     def fill(self, commands: Sequence[TimedCommand]) -> None:
         """Take the commands of an episode that begins."""
@@ -153,7 +155,7 @@ class Timetable(Block):
     def clear(self) -> None:
         """Leave the command as it is."""
         self.start[:] = np.inf
-        self.following[0] = 0
+        self.following = 0
 
 
 def empty_timetable() -> Timetable:
@@ -168,7 +170,7 @@ class Follower(Block):
     """The block of `follow_timetable`."""
 
     timetable: Timetable
-    clock: np.ndarray  # (1,) int: physics steps since the reset
+    clock: Clock
     timestep: float  # [s]
     command: np.ndarray  # (8,) of the controller's gait
 
@@ -177,9 +179,9 @@ class Follower(Block):
 def follow_timetable(f: Follower):
     """Tell the controller the command that the time has come for."""
     table = f.timetable
-    now, i = f.clock[0] * f.timestep + SOON, table.following[0]
+    now, i = f.clock.steps * f.timestep + SOON, table.following
     while i < table.start.shape[0] and table.start[i] <= now:
         for a in range(f.command.shape[0]):
             f.command[a] = table.commands[i, a]
         i += 1
-    table.following[0] = i
+    table.following = i

@@ -138,9 +138,9 @@ class Simbicon(Commanded, BaseController):
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial, its command too."""
         g = self.gait
-        for member in (g.command, g.velocity, g.error, g.planned, g.step_clock):
+        for member in (g.command, g.velocity, g.error, g.planned):
             member[:] = 0.0
-        g.walking[0], g.step_clock[0] = 1, -1.0
+        g.walking, g.step_clock = 1, -1.0
         self.stage = 0  #: 0 and 1: the left foot lifts and is lowered; 2 and 3: the right one
         self.steps = 0  #: begun since the reset
         self._clock = (1.0 - self.config.first) * self.config.lift_time / self.rate
@@ -189,7 +189,7 @@ class Simbicon(Commanded, BaseController):
             if self.stage == 0:
                 self._end_stride(state)
         m = self.memory
-        m.steps[0], m.foot[0], m.swinging[0] = self.steps, self.foot, self.stage % 2 == 0
+        m.steps, m.foot, m.swinging = self.steps, self.foot, self.stage % 2 == 0
 
     def _follow_command(self) -> None:
         """Let velocity and heading follow the command, no faster than they may."""
@@ -199,20 +199,20 @@ class Simbicon(Commanded, BaseController):
         g.velocity[:] += np.clip(g.command[:3] - g.velocity, -most, most)
         g.planned[:] = g.velocity[:2] + g.error
         self._yaw = (self._yaw or 0.0) + dt * float(g.velocity[2])
-        if g.step_clock[0] >= 0.0:
-            g.step_clock[0] += dt
+        if g.step_clock >= 0.0:
+            g.step_clock += dt
 
     def _end_stride(self, state: RobotState) -> None:
         """Sum up how far the velocity of the last stride was off, where one is asked for."""
         g, c = self.gait, self.config.speed
         if not g.velocity[:2].any():
             g.error[:] = 0.0
-        elif g.step_clock[0] > 0.0:
+        elif g.step_clock > 0.0:
             way = (state.com[:2] - g.middle) @ turn(self._yaw or 0.0)
             most = c.correction_limit * self.robot.height_com * self.rate
-            error = g.error + c.correction * (g.velocity[:2] - way / g.step_clock[0])
+            error = g.error + c.correction * (g.velocity[:2] - way / g.step_clock)
             g.error[:] = np.clip(error, -most, most)
-        g.middle[:], g.step_clock[0] = state.com[:2], 0.0
+        g.middle[:], g.step_clock = state.com[:2], 0.0
 
     def _pd(self, gain: Gain, error: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """K error − D speed [N·m]."""

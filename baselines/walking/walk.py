@@ -1,15 +1,14 @@
 """Walking at a commanded velocity, and standing as `capture-step` does where none is asked for."""
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
-from poise.baselines.balance.stepping.planning.blocks import CaptureTick, Search, StepGains
+from poise.baselines.balance.stepping.planning.blocks import LEG_NUMBERS, SEARCHED, CaptureTick
 from poise.baselines.balance.stepping.planning.config import StepLimits
-from poise.baselines.balance.stepping.planning.swing import Swing
 from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
 from poise.baselines.balance.stepping.planning.swing_task import bind_swings
 from poise.baselines.balance.stepping.planning.units import in_si
@@ -17,6 +16,7 @@ from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.envs.compiled.maths.pendulum import Units
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 from poise.envs.terrain.flat import Flat
@@ -27,9 +27,9 @@ from .controller import Commanded
 from .given import allocate_treads, given_footholds
 from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference, leg_task
-from .planner.arms import allocate_arms
+from .planner.arms import swinging_arms
 from .planner.blocks import Gait, WalkTick
-from .planner.command import GaitCommand
+from .planner.command import ENTRIES, STEP_PARAMETERS, GaitCommand
 from .planner.reach import Reach, check_command, reach_of
 from .tick import walk_tick
 
@@ -41,12 +41,22 @@ def allocate_gait(
 
     `limits` are what its legs can do of those of `config`; None: no step, no command is one then.
     """
-    numbers = in_si(Gait, config, units)
+    numbers = in_si(
+        config, units, "step_time", "transfer_time", "width", "height", "acceleration",
+        "turn_acceleration", "correction", "correction_limit", "time_price", "transfer_gain",
+        "start_radius", "start_time", "speed_margin", "lower", "catch", "calm_time",
+    )  # fmt: skip
     if limits is None:
         numbers["speed_margin"] = np.inf
+    command = guarded_zeros(ENTRIES)
+    parts: dict[str, Any] = {
+        f"commanded_{name}": command[i : i + 1] for i, name in enumerate(STEP_PARAMETERS, 3)
+    }
     return Gait.allocate(
         **numbers,
-        **in_si(Gait, limits or config.limits, units),
+        command=command,
+        **parts,
+        **in_si(limits or config.limits, units, "time_min"),
         treads=allocate_treads(config.treads, list(surfaces), units),
     )
 
@@ -97,13 +107,13 @@ class Walk(Commanded, CaptureStep):
         self._walk_tick: WalkTick | None = None
         legs = no_legs() if gait.model.keeps_height else leg_arrays(robot)
         self.reference = allocate_reference(robot, gait.qp.period, legs)
-        self.arms = allocate_arms(robot, self.gait_sets.parameters.accel_weight, gait.arm_weight)
+        self.arms = swinging_arms(robot, self.gait_sets.posture.weight, gait.arm_weight)
         super().__init__(robot, config)
 
     @property
     def walking(self) -> bool:
         """True from the first shift of weight until the walk has stopped."""
-        return bool(self.gait.walking[0])
+        return bool(self.gait.walking)
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with the limits of this robot for a command out of its reach."""
@@ -130,11 +140,9 @@ class Walk(Commanded, CaptureStep):
         limits = limits_of_legs(self.robot, self._gait_config)
         self.gait_limits = limits or self._gait_config.limits
         gait = allocate_gait(self._gait_config, self.robot.units, limits, given)
-        members = {item.name: getattr(self.gait, item.name) for item in fields(Gait)}
-        kept: dict[str, Any] = {
-            name: each for name, each in members.items() if isinstance(each, np.ndarray)
-        }
-        self.gait, self._terrain, self._walk_tick = replace(gait, **kept), terrain, None
+        members = self.gait.named().items()
+        kept = {name: each for name, each in members if isinstance(each, np.ndarray)}
+        self.gait, self._terrain, self._walk_tick = gait.replace(**kept), terrain, None
 
     @property
     def failures(self) -> int:
@@ -145,10 +153,8 @@ class Walk(Commanded, CaptureStep):
         """Forget the last trial, its command too."""
         super().reset(state)
         self.gait_sets.reset()
-        for member in self.gait.members():
-            if isinstance(member, np.ndarray):
-                member[...] = 0
-        self.gait.treads.leaning[:] = 0.0
+        self.gait.clear()
+        self.gait.treads.leaning = 0.0
 
     def block(self, state: RobotState, targets: Targets) -> WalkTick:
         """See `CaptureStep`."""
@@ -176,14 +182,13 @@ class Walk(Commanded, CaptureStep):
             self.gait_sets, capture.state, capture.reference_out, gait.swing,
             self._swing.reference, self.memory.level_frame, legs,
         )  # fmt: skip
-        swing = replace(
-            capture.swing,
-            **in_si(Swing, gait.swing, units),
+        swing = capture.swing.replace(
+            **in_si(gait.swing, units, "lift", "landing_speed"),
             apex=gait.swing.clearance * units.height,
         )
-        return replace(
-            capture, swing=swing,
-            gains=replace(capture.gains, **in_si(StepGains, gait, units)),
-            search=replace(capture.search, **in_si(Search, self.gait_limits, units)),
+        return capture.replace(
+            swing=swing,
+            gains=capture.gains.replace(**in_si(gait, units, *LEG_NUMBERS)),
+            search=capture.search.replace(**in_si(self.gait_limits, units, *SEARCHED)),
             **ticks,
         )  # fmt: skip

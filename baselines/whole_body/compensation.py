@@ -9,7 +9,7 @@ be. With c moved by −F z/W the CoP stays in the middle [Stephens07]. So c_ref 
 
     Δ = −(h/W) k F̂ − λ d F̄/|F̄| min(|F̄|/F₀, 1) |F̄|/S
 
-F̂ is the force that `push_force.py` estimates from c, ċ and p alone, F̄ its mean over the last
+F̂ is the force that `push_force.py` estimates from momentum and CoP, F̄ its mean over the last
 seconds and S that of |F̂|. The first part answers a push that lasts. The second one is for pushes
 that come again from one side: it stays between them, and is zero for pushes from all sides, whose
 |F̄|/S is. λ ∈ [0, 1] falls while the capture point is away from where it is to be, so that the
@@ -23,10 +23,11 @@ from typing import Annotated
 import numpy as np
 
 from poise.baselines.controller import TargetArrays
-from poise.envs.compiled.block import Block, Number
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import (
     StateArrays,
@@ -55,7 +56,7 @@ def _number(default: float, **bounds: float):
 class ForceCompensation:
     """Gains of `compensation.py`, without units: lengths in h, times in 1/ω, forces in m g."""
 
-    gain: float = _number(0.7, min=0.0, max=3.0)  # k of F̂
+    gain: float = _number(1.0, min=0.0, max=3.0)  # k of F̂
     smoothing: float = _number(SMOOTHING, min=0.0)  # τ of F̂ [1/ω]
     reach: float = _number(0.07, min=0.0, max=0.5)  # d, for pushes from one side [h]
     memory: float = _number(MEMORY, above=0.0)  # T of F̄ [1/ω]
@@ -65,7 +66,7 @@ class ForceCompensation:
     margin: float = _number(0.02, min=0.0)  # of c_ref from the edge of the support [h]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Compensation(Block):
     """All that `compensate` works on; in SI units."""
 
@@ -84,7 +85,7 @@ class Compensation(Block):
     return_time: float  # [s]
     margin: float  # [m]
     shift: Annotated[np.ndarray, 2]  # Δ [m], world
-    share: Number  # λ
+    share: Mutable[float]  # λ
 
 
 def make_compensation(
@@ -115,14 +116,14 @@ def rebound(c: Compensation, state: StateArrays, given: TargetArrays) -> Compens
     if c.state is state and c.given is given:
         return c
     moved = replace(given, com=c.moved.com, cop=c.moved.cop) if c.active else given
-    return replace(c, state=state, given=given, moved=moved)
+    return c.replace(state=state, given=given, moved=moved)
 
 
 def forget_compensation(c: Compensation) -> None:
     """Start an episode."""
     forget_pushes(c.push)
     c.shift[:] = 0.0
-    c.share[0] = 1.0
+    c.share = 1.0
 
 
 @compiled
@@ -132,9 +133,9 @@ def set_share(c: Compensation) -> None:
     x = s.capture_point[0] - t.com[0] - c.shift[0]
     y = s.capture_point[1] - t.com[1] - c.shift[1]
     if x * x + y * y > c.release * c.release:
-        c.share[0] = 0.0
+        c.share = 0.0
     else:
-        c.share[0] += c.period / (c.return_time + c.period) * (1.0 - c.share[0])
+        c.share += c.period / (c.return_time + c.period) * (1.0 - c.share)
 
 
 @compiled
@@ -151,8 +152,8 @@ def set_shift(c: Compensation) -> None:
     per_force = c.gain * height / borne_weight(c.robot, s)
     mean, lasting = np.sqrt(push.mean[0] * push.mean[0] + push.mean[1] * push.mean[1]), 0.0
     if mean > 0.0:
-        one_sided = min(mean / push.size[0], 1.0)
-        lasting = c.share[0] * c.reach * min(mean / c.full_at, 1.0) * one_sided / mean
+        one_sided = min(mean / push.size, 1.0)
+        lasting = c.share * c.reach * min(mean / c.full_at, 1.0) * one_sided / mean
     for a in range(2):
         c.shift[a] = -per_force * push.force[a] - lasting * push.mean[a]
 

@@ -30,7 +30,7 @@ def _sole_cones(s: StateArrays, p: QPParameters, ws: Workspace):
     With less of it forces along the sole and moments about its normal count for more.
     """
     nc, rows = p.cone.shape[0], p.cone.shape[1]
-    narrower = 1.0 / s.friction[0]
+    narrower = 1.0 / s.friction
     for i in range(nc):
         axes, first = s.sole_axes[i], i * rows
         for a in range(6):

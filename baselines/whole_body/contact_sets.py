@@ -6,6 +6,7 @@ contact only. A stack of tasks says what else is asked of v̇, such as the way o
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -50,9 +51,9 @@ class ContactSets(BoundQP):
         limit, count = self.parameters.torque_limit, len(robot.soles)
         self.slew = np.where(limit > 0.0, torque_rate_limit * limit, np.inf)
         self.applied = guarded_zeros(len(limit))  # torques of the last tick, if
-        self.follows = guarded_zeros(1, dtype=np.int64)  # there was one
+        self.follows: Any = guarded_zeros(1, dtype=np.int64)  # there was one
         # index of the subset of the last tick, −1: none
-        self.chosen = guarded_zeros(1, dtype=np.int64)
+        self.chosen: Any = guarded_zeros(1, dtype=np.int64)
         self.chosen[0] = -1
         subsets: list[tuple[int, ...]] = [(i,) for i in range(count)]
         if count > 1:
@@ -85,14 +86,14 @@ class ContactSets(BoundQP):
         configuration, then `tasks`."""
         chosen = self.sets[soles]
         feet, rows = slice(soles[0], soles[-1] + 1), slice(6 * soles[0], 6 * soles[-1] + 6)
-        own = replace(
-            s, J=s.J[rows], J_v=s.J_v[rows], Jdot_v=s.Jdot_v[rows], sole_point=s.sole_point[feet],
+        own = s.replace(
+            J=s.J[rows], J_v=s.J_v[rows], Jdot_v=s.Jdot_v[rows], sole_point=s.sole_point[feet],
             sole_axes=s.sole_axes[feet], contacts=s.contacts[feet], origin=guarded_zeros(3),
         )  # fmt: skip
         ws = chosen.workspace
         problem = self.new_assembly(chosen.arrays, own, chosen.parameters, targets, ws, s, tasks)
         return ContactTick.allocate(
-            {"nc": len(soles)}, problem=problem, memory=self.memory,
+            {"nc": len(soles)}, problem=problem, memory=self.memory, posture=self.posture,
             applied=self.applied, slew=self.slew, follows=self.follows, chosen=self.chosen,
             index=chosen.index, assemble=address_of(assemble, problem), solve=address_of(solve, ws),
         )  # fmt: skip

@@ -10,7 +10,8 @@ Macchietto09]. w are the wrenches of the soles, then the forces of other points 
 `MomentumQP` solves the same problem, compiled and with the equalities eliminated (`reduced_qp.py`),
 and is tested against this one. To try another task or limit, hand its rows to `build`:
 
-    qp = build(state, targets, controller.parameters, tasks=[Rows(A, b, weights)])
+    tasks = [*controller.tasks.values(), Rows(A, b, weights)]
+    qp = build(state, targets, controller.parameters, tasks)
     solution = make_solver("active-set").solve(qp)
     torques = torques_of(state, solution.x)
 """
@@ -25,27 +26,20 @@ from poise.baselines.solvers import QP
 from poise.envs.physics.state import RobotState
 
 from .constraint_rows import (
-    accel_rows,
-    angular_momentum_rows,
     contact_jacobian,
     contact_motion,
     joint_limits,
-    linear_momentum_rows,
     point_cones,
-    posture_rows,
     root_dynamics,
-    root_rows,
     sole_cones,
     torque_limits,
     torque_matrix,
-    torque_rows,
-    wrench_rows,
 )
 from .contacts.contact import ContactRows
 from .limits.limit import Bounds, Limit
 from .parameters import QPParameters
 from .parts.part import Bound
-from .tasks.task import Rows
+from .tasks.task import Rows, Task, all_rows, task_input
 
 
 class Unknowns(NamedTuple):
@@ -73,33 +67,34 @@ def build(
     state: RobotState,
     targets: Targets,
     parameters: QPParameters,
+    tasks: Iterable[Bound[Task] | Rows],
     cop_vel: np.ndarray | None = None,
-    tasks: Sequence[Rows] = (),
     constraints: Sequence[Bounds] = (),
     points: Sequence[ContactRows] = (),
     limits: Iterable[Bound[Limit]] = (),
 ) -> QP:
-    """The QP of one tick in x = (v̇, w) or (v̇, w, u_root), with `tasks` and `constraints` added.
+    """The QP of one tick in x = (v̇, w) or (v̇, w, u_root).
 
     Args:
-        parameters: gains and limits in SI units: `MomentumQP.parameters`, or `qp_parameters`.
+        parameters: numbers of contacts and limits: `MomentumQP.parameters`, or `qp_parameters`.
+        tasks: the objective, such as `controller.tasks.values()`, with rows of your own or without.
         cop_vel: (2,) ṗ, which a controller measures between its ticks; at rest if left out.
-        tasks: such as `[task.rows(state) for task in controller.tasks.values()]`.
-        points: contacts of other bodies, from `controller.contacts` in the same way.
+        constraints: further ones.
+        points: contacts of other bodies: `[c.rows(state) for c in controller.contacts.values()]`.
         limits: such as `controller.limits.values()`.
     """
     p = parameters
-    cop_vel = np.zeros(2) if cop_vel is None else cop_vel
     motion, weakest = contact_motion(state, p, points)
+    torques = torque_matrix(state, points)
+    given = task_input(state, targets, cop_vel=cop_vel, torques=torques)
     terms = [
-        posture_rows(state, targets, p),
-        linear_momentum_rows(state, targets, p),
-        angular_momentum_rows(state, targets, p, cop_vel),
-        wrench_rows(state, p, points),
-        torque_rows(state, p, points),
-        accel_rows(state, p),
+        *all_rows(tasks, given),
+        *point_loads(state, points),
         weakest,
-        *tasks,
+        least_accelerations(state, p),
+        # Zero wherever the soles do not move, so it changes no solution; but H becomes positive
+        # definite even if no task weighs the root's linear acceleration.
+        Rows(motion.C, motion.l, np.full(len(motion.l), 100.0 / state.robot.units.omega**4)),
     ]
     bounds = [
         root_dynamics(state, p, points),
@@ -107,21 +102,31 @@ def build(
         sole_cones(state, p),
         torque_limits(state, p, points),
         *([joint_limits(state, p)] if p.brakes else []),
-        *(limit.rows(state, torque_matrix(state, points)) for limit in limits),
+        *(limit.rows(state, torques) for limit in limits),
         *constraints,
     ]
     if points:
         bounds.append(point_cones(state, points))
-    if p.soft_root:
-        terms.append(root_rows(state, p, points))
-    # Zero wherever the soles do not move, so it changes no solution; but H becomes positive
-    # definite even if no task weighs the root's linear acceleration.
-    terms.append(Rows(motion.C, motion.l, np.full(len(motion.l), p.accel_weight.max())))
-    k = len(state.J) + 3 * len(points)
-    return assemble(terms, bounds, len(state.qvel) + k + (6 if p.soft_root else 0))
+    return sum_up(terms, bounds, torques.shape[1] + (6 if p.soft_root else 0))
 
 
-def assemble(tasks: Sequence[Rows], constraints: Sequence[Bounds], n: int) -> QP:
+def point_loads(state: RobotState, points: Sequence[ContactRows]) -> list[Rows]:
+    """½ Σ weights (f − f_des)² of each point in contact."""
+    first = len(state.qvel) + len(state.J)
+    starts = range(first, first + 3 * len(points), 3)
+    return [
+        Rows(np.eye(3, start + 3, start), point.force, point.weights)
+        for start, point in zip(starts, points, strict=True)
+    ]
+
+
+def least_accelerations(state: RobotState, p: QPParameters) -> Rows:
+    """Small accelerations: ‖v̇‖², a trace that keeps the compiled problem well posed."""
+    nv = len(state.qvel)
+    return Rows(np.eye(nv), np.zeros(nv), np.full(nv, p.accel_floor))
+
+
+def sum_up(tasks: Sequence[Rows], constraints: Sequence[Bounds], n: int) -> QP:
     """H = Σ Aᵀ W A, g = −Σ Aᵀ W b, and the constraints one below the other, for n unknowns."""
     H, g = np.zeros((n, n)), np.zeros(n)
     for task in tasks:

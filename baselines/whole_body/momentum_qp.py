@@ -30,17 +30,19 @@ from .compensation import (
     rebound,
 )
 from .contacts.contact import contact_arrays
-from .gains import COMPILED_SOLVER, CoMTask, MomentumQPConfig
+from .gains import COMPILED_SOLVER, MomentumQPConfig
 from .parameters import QPParameters, qp_parameters
 from .parts.part import Bound, bind_parts
 from .reduced_qp import Assembly, assemble
-from .stack import fill_from_python, limit_program, make_stack
-from .tasks.task import Task
+from .stack import copies, exchange_targets, fill_from_python, limit_program, make_stack
+from .tasks.com import CoM
+from .tasks.posture import PostureBlock, no_posture
+from .tasks.task import Task, task_input
 from .tick import Tick, accept, allocate_memory, forget, momentum_tick, release_joints, solve
 from .workspace import Workspace, allocate_workspace
 
 
-def com_offset(robot: Robot, task: CoMTask) -> float:
+def com_offset(robot: Robot, task: CoM | None) -> float:
     """Where the CoM is to stand, forward of the middle of the soles [m].
 
     A robot whose description says nothing else stands as described: the offset of gains that were
@@ -48,15 +50,16 @@ def com_offset(robot: Robot, task: CoMTask) -> float:
     """
     if robot.description.posture.com != "controller":
         return robot.com_ahead
-    return task.offset * robot.height_com
+    return task.offset * robot.height_com if task is not None else 0.0
 
 
 class BoundQP(Copyable):
     """A configuration of the momentum QP for one robot, and what outlives its ticks.
 
     Attributes:
-        tasks, contacts, limits: those of the configuration by name; the arrays of their `block`,
-            such as a task's reference, may be written to at any time.
+        tasks: the objective by name, see `MomentumQPConfig.objective`.
+        contacts, limits: those of the configuration by name. The arrays of the `block` of a task,
+            a contact or a limit, such as weights or a reference, may be written to at any time.
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig):
@@ -65,15 +68,20 @@ class BoundQP(Copyable):
         self.robot, self.config, self.period = robot, config, config.period
         self.arrays = robot_arrays(robot)
         self.parameters = qp_parameters(robot, self.arrays, config)
-        self.tasks = bind_parts(config.tasks, robot, "tasks")
+        self.tasks = bind_parts(config.objective(), robot, "tasks")
         self.contacts = bind_parts(config.contacts, robot, "contacts")
         self.limits = bind_parts(config.limits, robot, "limits")
+        posture = self.tasks.get("posture")
+        #: the gains of the task `posture`; zero without one
+        self.posture: PostureBlock = no_posture(robot.model.nv)
+        if posture is not None and isinstance(posture.block, PostureBlock):
+            self.posture = posture.block
         self.memory = allocate_memory(self.parameters.torque_limit)
 
     @property
     def failures(self) -> int:
         """The ticks since the reset at which the QP was not solved."""
-        return int(self.memory.failures[0])
+        return self.memory.failures
 
     def new_workspace(self, arrays: RobotArrays, p: QPParameters) -> Workspace:
         """Zeroed scratch for the soles of `arrays`."""
@@ -83,6 +91,7 @@ class BoundQP(Copyable):
             [contact.chain(block) for contact, block in points],
             sum(contact.cone_rows for contact, _ in points),
             sum(limit.size(block) for limit, block in self.limits.values()),
+            copies(self.tasks.values()),
         )  # fmt: skip
 
     def new_assembly(
@@ -103,7 +112,7 @@ class BoundQP(Copyable):
         return Assembly(
             robot=arrays, state=s, parameters=p, targets=t, period=self.period, workspace=ws,
             contacts=contact_arrays(s, points, ws.contact_accel, ws.force_weights, ws.force_des),
-            tasks=make_stack([*self.tasks.values(), *tasks], whole, ws),
+            tasks=make_stack([*self.tasks.values(), *tasks], whole, t, s, ws),
             limits=limit_program(self.limits.values(), whole, ws),
         )  # fmt: skip
 
@@ -174,8 +183,12 @@ class MomentumQP(BoundQP, CompiledController):
     @property
     def compiled(self) -> bool:
         """True with the compiled solver, and kernels for all tasks; see `CompiledController`."""
-        kernels = all(task.kernel is not None for task, _ in self.tasks.values())
-        return super().compiled and self.solver is None and kernels
+        return super().compiled and self.solver is None and self._kernels
+
+    @property
+    def _kernels(self) -> bool:
+        """True with kernels for all tasks."""
+        return all(task.kernel is not None for task, _ in self.tasks.values())
 
     def gains(self) -> QPParameters:
         """The parameters in SI units; see `CompiledController`."""
@@ -183,7 +196,9 @@ class MomentumQP(BoundQP, CompiledController):
 
     def outputs(self) -> Outputs:
         ws, p = self.workspace, self.parameters
-        return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root, ws.vdot)
+        return Outputs(
+            ws.tau, ws.root_wrench, self.memory.memory_of("failures"), p.soft_root, ws.vdot
+        )
 
     def compensation(self, state: RobotState, targets: Targets) -> Compensation:
         """The block that `compensate` moves these targets by, see `ForceCompensation`."""
@@ -201,6 +216,8 @@ class MomentumQP(BoundQP, CompiledController):
         if known is None or known.state is not s:
             known = self.new_assembly(self.arrays, s, self.parameters, t, self.workspace, s)
         elif known.targets is not t or known.parameters is not self.parameters:
+            if known.targets is not t:
+                exchange_targets(known.tasks, t)
             known = replace(known, targets=t, parameters=self.parameters)
         self._assembly = known
         return known
@@ -216,7 +233,10 @@ class MomentumQP(BoundQP, CompiledController):
     def _filled(self, state: RobotState, targets: Targets) -> Assembly:
         """`assembly`, with the rows of tasks that Python fills."""
         problem = self.assembly(state, targets)
-        fill_from_python(problem.tasks, self.tasks.values(), state)
+        if not self._kernels:
+            vel = np.nan_to_num((state.cop - self.workspace.cop_prev) / self.period)
+            given = task_input(state, problem.targets, cop_vel=vel)
+            fill_from_python(problem.tasks, list(self.tasks.values()), given)
         return problem
 
     def problem(self, state: RobotState, targets: Targets) -> QP:
@@ -244,7 +264,7 @@ class MomentumQP(BoundQP, CompiledController):
                 solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.solved:
                 ws.x[:] = solution.x
-            ws.status[0] = 0 if solution.solved else 1
+            ws.status = 0 if solution.solved else 1
             accept(state.arrays, self.parameters, ws, self.memory)
         return ws.tau[self._motor_joints].copy()
 

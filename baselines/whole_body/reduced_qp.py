@@ -23,13 +23,13 @@ from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
-from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.kinematics import StateArrays, borne_weight
 
 from .constraints import build_constraints
 from .contacts.contact import ContactArrays
-from .objective import build_objective, carry_momentum, desired_accelerations, desired_momentum_rate
+from .objective import build_objective
 from .parameters import QPParameters
-from .stack import TaskStack, add_stack
+from .stack import TaskStack
 from .workspace import Workspace
 
 
@@ -41,7 +41,7 @@ class Assembly(Block):
     state: StateArrays
     contacts: ContactArrays
     parameters: QPParameters
-    targets: TargetArrays
+    targets: TargetArrays  # of the tasks
     period: float  # [s] between two ticks
     tasks: TaskStack
     limits: Program  # the kernels of further limits, see `limits/`
@@ -51,19 +51,27 @@ class Assembly(Block):
 @compiled
 def assemble(a: Assembly):
     """Fill `H, g, C, l, u` of the workspace: min ½xᵀHx + gᵀx, l ≤ Cx ≤ u for this tick."""
-    robot, s, c, p, t, ws = a.robot, a.state, a.contacts, a.parameters, a.targets, a.workspace
-    desired_accelerations(s, p, t, ws)
-    desired_momentum_rate(robot, s, p, t, a.period, ws)
+    robot, s, c, p, ws = a.robot, a.state, a.contacts, a.parameters, a.workspace
+    _measure(robot, s, a.period, ws)
     _update_contacts(s, c)
     _eliminate_contacts(s, c, p, ws)
     _distribute_wrench(s, c, p, ws)
-    carry_momentum(p, t, ws)
     _torques(s, c, ws)
-    build_objective(robot, s, p, t, ws)
+    run(a.tasks.fill)
+    build_objective(s, p, a.tasks, ws)
     build_constraints(robot, s, p, c, ws)
     run(a.limits)
-    if a.tasks.b.shape[0] > 0:
-        add_stack(a.tasks, ws)
+
+
+@compiled
+def _measure(robot: RobotArrays, s: StateArrays, period: float, ws: Workspace):
+    """Fill ṗ, the difference between two ticks, and the force that bears the robot at rest."""
+    for a in range(2):
+        if np.isnan(ws.cop_prev[a]):
+            ws.cop_prev[a] = s.cop[a]
+        ws.cop_vel[a] = (s.cop[a] - ws.cop_prev[a]) / period
+        ws.cop_prev[a] = s.cop[a]
+    ws.force[2] = borne_weight(robot, s)
 
 
 @compiled

@@ -31,14 +31,9 @@ from .action import checked_action, take_action
 from .config import EnvConfig as EnvConfig
 from .config import env_config
 from .episode import (
-    FAILURES,
-    FALLEN,
-    QUIET_STEPS,
-    SATURATED,
-    TERMINATED,
-    TICKS,
     EpisodeArrays,
     Judge,
+    Metrics,
     StepEnd,
     begin_episode,
 )
@@ -109,7 +104,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         #: entries of the policy's observation; the others are privileged
         self.seen = sum(term.size for term in seen)
         sizes = {"na": len(self.action_names), "no": size, "terms": len(REWARD_TERMS)}
-        self.episode = EpisodeArrays.allocate(sizes | self.simulation.sizes)
+        self.episode = EpisodeArrays.allocate(
+            sizes | self.simulation.sizes, metrics=Metrics.allocate()
+        )
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self._described: tuple[object, list[PushInfo]] = None, []  # pushes, their infos
@@ -117,7 +114,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     @property
     def steps(self) -> int:
         """Policy steps since the reset."""
-        return int(self.episode.steps[0])
+        return int(self.episode.steps)
 
     @property
     def episode(self) -> EpisodeArrays:
@@ -201,8 +198,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         """Return the members that a block of this `kind` adds to `View`, as a `MeasuredView`."""
         source = self.state_source
         if isinstance(source, EstimatedState):
-            return source.sensors.rings, source.estimation.steps, False
-        return Rings.allocate(self.simulation.sizes), guarded_zeros(1, int), True
+            return source.sensors.rings, source.estimation.memory_of("sense"), False
+        return Rings.allocate(self.simulation.sizes), 0, True
 
     def _judge(self) -> Judge:
         """The block that judges the policy steps of this environment."""
@@ -232,11 +229,11 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         if self._end is None or self._end_of is not world:
             e = self.episode
             seen, true = e.observation[: self.seen], e.observation[self.seen :]
-            estimated = partial(self._view, self.state_source)
-            calls = observer(self._newest, seen, e.steps, estimated)
+            steps, estimated = e.memory_of("steps"), partial(self._view, self.state_source)
+            calls = observer(self._newest, seen, steps, estimated)
             if self._privileged:
                 known = partial(self._view, self.simulation)
-                calls += observer(self._privileged, true, e.steps, known)
+                calls += observer(self._privileged, true, steps, known)
             self._end = StepEnd(self._judge(), self._report(), Program.of(calls))
             self._end_of = world
         return self._end
@@ -307,7 +304,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
-        self.episode.running[0] = 0  # until this one has succeeded
+        self.episode.running = 0  # until this one has succeeded
         options = reset_options(options, self.option_names)
         super().reset(seed=seed_number(seed))
         rng = self.np_random
@@ -367,13 +364,13 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         """Take the step of an action that has been set: reward, terminated, truncated."""
         self.expect_running()
         self.advance()
-        terminated = bool(self.episode.metrics[TERMINATED])
-        truncated = not (terminated or self.episode.running[0])
-        return float(self.episode.reward[0]), terminated, truncated
+        terminated = bool(self.episode.metrics.terminated)
+        truncated = not (terminated or self.episode.running)
+        return float(self.episode.reward), terminated, truncated
 
     def expect_running(self) -> None:
         """Raises PoiseError if there is no episode that could go on."""
-        if not self.episode.running[0]:
+        if not self.episode.running:
             raise PoiseError("step() after the episode's end: call reset() first")
 
     def _observe(self) -> None:
@@ -383,23 +380,22 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     @property
     def fallen(self) -> bool:
         """True after a fall; where a fall does not end the episode, while the robot is down."""
-        return bool(self.episode.metrics[FALLEN])
+        return bool(self.episode.metrics.fallen)
 
     @property
     def recovered(self) -> bool:
         """Upright, quiet and with feet at rest for the last `quiet_time` seconds."""
-        return bool(self.episode.metrics[QUIET_STEPS] >= self.quiet_steps)
+        return bool(self.episode.metrics.quiet_steps >= self.quiet_steps)
 
     def info(self) -> dict[str, Any]:
         """Reward terms, push and record of the episode so far, and the robot where it is drawn."""
-        # Python's own numbers: arithmetic with NumPy's costs ten times as much
-        metrics, terms = self.episode.metrics.tolist(), self.episode.reward_terms.tolist()
+        metrics, terms = self.episode.metrics, self.episode.reward_terms.tolist()
         info = {
             "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
             "push": self.push_infos(),
             "is_success": self.recovered,
-            "solver_failures": int(metrics[FAILURES]),
-            "torque_saturation": metrics[SATURATED] / max(metrics[TICKS], 1.0),
+            "solver_failures": int(metrics.failures),
+            "torque_saturation": metrics.saturated / max(metrics.ticks, 1.0),
             "root_wrench": self.episode.root_wrench.copy(),
         }
         if self.drawn is not None:

@@ -8,54 +8,69 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.clock import Clock
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
 
 from .mdp.reward import Rewards, sum_rewards
 from .mdp.termination import Limits, has_diverged, has_fallen, uprightness
 
-(
-    QUIET_STEPS,  # policy steps in a row that were quiet, with feet at rest
-    FALLEN,  # 1 after a fall
-    ENERGY,  # ∫ Σ |τ q̇| dt [J]
-    PEAK_TORQUE,  # largest |τ|/τ_max
-    SATURATED,  # sum over ticks of the fraction of motors at their limit
-    TICKS,  # control ticks
-    MAX_COM,  # largest distance of the CoM from the middle of the soles [m]
-    MAX_CAPTURE,  # the same of the capture point [m]
-    MIN_COP_MARGIN,  # smallest distance of the CoP from the edge of the support [m]
-    MAX_SLIDE,  # largest distance of a sole from where it started [m]
-    ROOT_FORCE,  # largest force of a soft root [N]
-    ROOT_MOMENT,  # largest moment of a soft root [N·m]
-    LAST_MOVING,  # time of the last policy step that was not quiet [s]
-    FAILURES,  # control ticks at which the controller's solver failed
-    POSITIVE_WORK,  # ∫ Σ max(τ q̇, 0) dt [J]
-    TORQUE_VARIATION,  # sum over ticks of the mean over motors of |Δτ|/τ_max
-    TORQUE_TIME,  # of the ticks that were accounted for [s]
-    EDGE_CONTACTS,  # times that a foot came to touch an edge of the terrain
-    TERMINATED,  # 1 where the episode ended by a fall, or because the simulation diverged
-) = range(19)
-METRICS = 19
+
+@dataclass(eq=False)
+class Metrics(Block):
+    """What an episode is judged by."""
+
+    quiet_steps: Mutable[float]  # policy steps in a row that were quiet, with feet at rest
+    fallen: Mutable[float]  # 1 after a fall
+    energy: Mutable[float]  # ∫ Σ |τ q̇| dt [J]
+    peak_torque: Mutable[float]  # largest |τ|/τ_max
+    saturated: Mutable[float]  # sum over ticks of the fraction of motors at their limit
+    ticks: Mutable[float]  # control ticks
+    max_com: Mutable[float]  # largest distance of the CoM from the middle of the soles [m]
+    max_capture: Mutable[float]  # the same of the capture point [m]
+    min_cop_margin: Mutable[float]  # smallest distance of the CoP from the edge of the support [m]
+    max_slide: Mutable[float]  # largest distance of a sole from where it started [m]
+    root_force: Mutable[float]  # largest force of a soft root [N]
+    root_moment: Mutable[float]  # largest moment of a soft root [N·m]
+    last_moving: Mutable[float]  # time of the last policy step that was not quiet [s]
+    failures: Mutable[float]  # control ticks at which the controller's solver failed
+    positive_work: Mutable[float]  # ∫ Σ max(τ q̇, 0) dt [J]
+    torque_variation: Mutable[float]  # sum over ticks of the mean over motors of |Δτ|/τ_max
+    torque_time: Mutable[float]  # of the ticks that were accounted for [s]
+    edge_contacts: Mutable[float]  # times that a foot came to touch an edge of the terrain
+    terminated: Mutable[
+        float
+    ]  # 1 where the episode ended by a fall, or because the simulation diverged
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class EpisodeArrays(Block):
     """The record that compiled steps write of the running episode."""
 
     action: Annotated[np.ndarray, "na"]
     last_action: Annotated[np.ndarray, "na"]
     observation: Annotated[np.ndarray, "no"]
-    reward: Annotated[np.ndarray, 1]  # of the last policy step
+    reward: Mutable[float]  # of the last policy step
     reward_terms: Annotated[np.ndarray, "terms"]  # weighted; their sum is the reward
-    metrics: Annotated[np.ndarray, METRICS]
+    metrics: Metrics
     last_torque: Annotated[np.ndarray, "nu"]  # of the last control tick [N·m]
     root_wrench: Annotated[np.ndarray, 6]  # of a soft root in the last tick [N, N·m]
     sole_start: Annotated[np.ndarray, "nc", 2]
     sole_rest: Annotated[np.ndarray, "nc", 2]  # where they were when the running quiet time began
     edges: Annotated[np.ndarray, "nc"]  # 1 where a foot touched an edge in the last policy step
-    steps: Annotated[np.ndarray, 1, np.int64]  # policy steps since the reset
-    running: Annotated[np.ndarray, 1, np.int64]  # whether there may be another one
-    ticks: Annotated[np.ndarray, 1, np.int64]  # control ticks of the running policy step
+    steps: Mutable[int]  # policy steps since the reset
+    running: Mutable[int]  # whether there may be another one
+    ticks: Mutable[int]  # control ticks of the running policy step
+
+
+@compiled
+def _clear(m: Metrics):
+    m.quiet_steps = m.fallen = m.energy = m.peak_torque = m.saturated = m.ticks = 0.0
+    m.max_com = m.max_capture = m.max_slide = m.root_force = m.root_moment = 0.0
+    m.last_moving = m.failures = m.positive_work = m.torque_variation = m.torque_time = 0.0
+    m.edge_contacts = m.terminated = 0.0
+    m.min_cop_margin = np.inf
 
 
 @compiled
@@ -63,13 +78,12 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
     """Clear the record; feet are where they should stay."""
     e.action[:] = 0.0
     e.last_action[:] = 0.0
-    e.reward[0] = 0.0
+    e.reward = 0.0
     e.reward_terms[:] = 0.0
-    e.metrics[:] = 0.0
+    _clear(e.metrics)
     e.root_wrench[:] = 0.0
     e.edges[:] = 0.0
-    e.metrics[MIN_COP_MARGIN] = np.inf
-    e.steps[0], e.running[0], e.ticks[0] = 0, 1, 0
+    e.steps, e.running, e.ticks = 0, 1, 0
     for i in range(s.sole_point.shape[0]):
         e.sole_start[i, 0], e.sole_start[i, 1] = s.sole_point[i, 0], s.sole_point[i, 1]
     keep_rest(s, e)
@@ -87,16 +101,16 @@ def record_tick(
         power += abs(work)
         positive += max(work, 0.0)
         load = abs(tau[i]) / robot.torque_limit[i]
-        m[PEAK_TORQUE] = max(m[PEAK_TORQUE], load)
+        m.peak_torque = max(m.peak_torque, load)
         saturated += 1.0 if load > 0.999 else 0.0
         change += abs(tau[i] - e.last_torque[i]) / robot.torque_limit[i]
         e.last_torque[i] = tau[i]
-    m[ENERGY] += power * period
-    m[POSITIVE_WORK] += positive * period
-    m[SATURATED] += saturated / tau.shape[0]
-    m[TORQUE_VARIATION] += change / tau.shape[0] if m[TICKS] > 0.0 else 0.0
-    m[TORQUE_TIME] += period
-    m[TICKS] += 1.0
+    m.energy += power * period
+    m.positive_work += positive * period
+    m.saturated += saturated / tau.shape[0]
+    m.torque_variation += change / tau.shape[0] if m.ticks > 0.0 else 0.0
+    m.torque_time += period
+    m.ticks += 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +120,7 @@ class Judge(Block):
     robot: RobotArrays
     views: SimViews
     state: StateArrays
-    clock: np.ndarray  # (1,) int: physics steps since the reset
+    clock: Clock
     limits: Limits
     rewards: Rewards
     episode: EpisodeArrays
@@ -120,13 +134,13 @@ def judge_step(j: Judge):
     diverged = has_diverged(j.views)
     fallen = diverged or has_fallen(j.robot, s, j.limits)
     over = diverged or (fallen and j.limits.terminates)
-    m[FALLEN], m[TERMINATED] = 1.0 if fallen else 0.0, 1.0 if over else 0.0
+    m.fallen, m.terminated = 1.0 if fallen else 0.0, 1.0 if over else 0.0
     record_quiet(j, fallen)
     record_excursions(s, e)
     record_edges(s, e)
-    e.reward[0] = sum_rewards(j.rewards, fallen, diverged, e.reward_terms)
-    e.steps[0] += 1
-    e.running[0] = not over and e.steps[0] < j.limits.max_steps
+    e.reward = sum_rewards(j.rewards, fallen, diverged, e.reward_terms)
+    e.steps += 1
+    e.running = not over and e.steps < j.limits.max_steps
 
 
 @compiled
@@ -159,11 +173,11 @@ def record_quiet(j: Judge, fallen: bool):
     quiet = quiet and uprightness(j.robot, s) > j.limits.quiet_cos_tilt
     quiet = quiet and support_distance(s, s.com[0], s.com[1]) > 0.0
     still = sole_distance(s, e.sole_rest) <= j.limits.quiet_slide
-    m[QUIET_STEPS] = m[QUIET_STEPS] + 1.0 if quiet and still else 0.0
-    if m[QUIET_STEPS] % j.limits.quiet_steps == 0.0:
+    m.quiet_steps = m.quiet_steps + 1.0 if quiet and still else 0.0
+    if m.quiet_steps % j.limits.quiet_steps == 0.0:
         keep_rest(s, e)
     if not quiet:
-        m[LAST_MOVING] = j.clock[0] * j.robot.timestep
+        m.last_moving = j.clock.steps * j.robot.timestep
 
 
 @compiled
@@ -172,10 +186,10 @@ def record_excursions(s: StateArrays, e: EpisodeArrays):
     m = e.metrics
     com_x, com_y = s.com[0] - s.origin[0], s.com[1] - s.origin[1]
     xi_x, xi_y = s.capture_point[0] - s.origin[0], s.capture_point[1] - s.origin[1]
-    m[MAX_COM] = max(m[MAX_COM], np.sqrt(com_x * com_x + com_y * com_y))
-    m[MAX_CAPTURE] = max(m[MAX_CAPTURE], np.sqrt(xi_x * xi_x + xi_y * xi_y))
-    m[MIN_COP_MARGIN] = min(m[MIN_COP_MARGIN], support_distance(s, s.cop[0], s.cop[1]))
-    m[MAX_SLIDE] = max(m[MAX_SLIDE], sole_distance(s, e.sole_start))
+    m.max_com = max(m.max_com, np.sqrt(com_x * com_x + com_y * com_y))
+    m.max_capture = max(m.max_capture, np.sqrt(xi_x * xi_x + xi_y * xi_y))
+    m.min_cop_margin = min(m.min_cop_margin, support_distance(s, s.cop[0], s.cop[1]))
+    m.max_slide = max(m.max_slide, sole_distance(s, e.sole_start))
 
 
 @compiled
@@ -183,7 +197,7 @@ def record_edges(s: StateArrays, e: EpisodeArrays):
     """Count the feet that have come to touch an edge."""
     for i in range(s.edges.shape[0]):
         if s.edges[i] > 0.5 and e.edges[i] < 0.5:
-            e.metrics[EDGE_CONTACTS] += 1.0
+            e.metrics.edge_contacts += 1.0
         e.edges[i], s.edges[i] = s.edges[i], 0.0
 
 

@@ -6,21 +6,25 @@ its numbers, lie one after the other in memory, and only what a function uses is
 """
 
 import re
+import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import FrozenInstanceError, fields
 from functools import cache
-from typing import Annotated, Any, Self, get_origin, get_type_hints
+from inspect import get_annotations
+from typing import Annotated, Any, ClassVar, Self, get_origin, get_type_hints
 
 import llvmlite.ir
 import numba
 import numpy as np
 from numba.core import cgutils, types
 from numba.core.datamodel import models
+from numba.core.errors import TypingError
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
     lower_getattr_generic,
+    lower_setattr_generic,
     register_model,
     typeof_impl,
     unbox,
@@ -30,26 +34,50 @@ from numba.np.arrayobj import populate_array
 
 from .copies import portable
 from .memory import guarded_zeros
-
-#: in a block: a number that compiled code writes, which is an array of one entry
-Number = Annotated[np.ndarray, 1]
-Integer = Annotated[np.ndarray, 1, np.int64]
+from .mutable import MutableMember, mutable_dtype
 
 
-@dataclass(frozen=True, eq=False)
 class Block:
-    """Base of frozen dataclasses of arrays, floats, ints, bools and other blocks.
+    """Base of dataclasses of arrays, floats, ints, bools and other blocks.
 
     Numbers are copied when the block is made; arrays are shared, so writing into them is seen by
-    both sides. A block must outlive the compiled calls that use it: it holds its arrays.
+    both sides. A number that changes is a `Mutable[float]`, `Mutable[int]` or `Mutable[bool]`:
+    `block.clock += dt` in Python and in compiled code. Nothing else can be assigned. A block
+    is `@dataclass(eq=False)` if it has such numbers, else `@dataclass(frozen=True, eq=False)`.
+
+    A block must outlive the compiled calls that use it: it holds its arrays.
     """
 
+    mutable: ClassVar[dict[str, MutableMember]] = {}  #: the mutable numbers by name
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        own = {}
+        for name, kind in get_annotations(cls).items():
+            if hasattr(Block, name):
+                raise TypeError(f"{cls.__name__}.{name}: every block has something of this name")
+            if (dtype := mutable_dtype(kind)) is not None:
+                own[name] = MutableMember(name, dtype)
+                setattr(cls, name, own[name])
+        cls.mutable = {**cls.mutable, **own}
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if "_address" in vars(self) and name not in self.mutable:
+            raise FrozenInstanceError(f"cannot assign {name!r} of {type(self).__name__}")
+        super().__setattr__(name, value)
+
     def __post_init__(self) -> None:
+        if self.mutable and type(self).__dataclass_params__.frozen:  # type: ignore[attr-defined]
+            raise TypeError(f"{type(self).__name__} has mutable numbers, and is frozen")
+        if self.mutable and sys._getframe(2).f_globals.get("__name__") == "dataclasses":
+            raise TypeError("dataclasses.replace would not share mutable numbers: use .replace")
         words: list[int] = []
-        members = []
-        for field in fields(self):
-            kind, content = _words(getattr(self, field.name))
-            members.append((field.name, kind, len(words)))
+        members: list[tuple[str, types.Type, int]] = []
+        for name, value in self.named().items():
+            kind, content = _words(value)
+            if name in self.mutable:
+                kind, content = MutableType(kind.dtype), content[:1]
+            members.append((name, kind, len(words)))
             words += content
         memory = np.array(words, dtype=np.int64)
         object.__setattr__(self, "_memory", memory)
@@ -58,13 +86,16 @@ class Block:
 
     @classmethod
     def allocate(cls, sizes: Mapping[str, int] | None = None, **members: Any) -> Self:
-        """A block of these members, and of zeros for every other array, whose shape is annotated.
+        """A block of these members, and of zeros for every other mutable number and array.
 
-        `Annotated[np.ndarray, "nv+1", 3]` is (nv + 1, 3), of which `sizes` has nv; "6nc" is six
-        times nc. A type at the end is that of the numbers, which are floats by default.
+        The shape of such an array is annotated: `Annotated[np.ndarray, "nv+1", 3]` is (nv + 1, 3),
+        of which `sizes` has nv; "6nc" is six times nc. A type at the end is that of the numbers,
+        which are floats by default.
         """
         for name, kind in get_type_hints(cls, include_extras=True).items():
-            if name not in members and get_origin(kind) is Annotated:
+            if name in cls.mutable:
+                members.setdefault(name, 0)
+            elif name not in members and get_origin(kind) is Annotated:
                 *shape, last = kind.__metadata__
                 typed = isinstance(last, type)
                 shape += [] if typed else [last]
@@ -89,15 +120,56 @@ class Block:
         object.__setattr__(self, name, value)
         self._memory[word] = np.float64(value).view(np.int64)  # type: ignore[attr-defined]
 
+    def replace_block(self, name: str, block: "Block") -> None:
+        """Exchange a block for another one of its type between two calls of compiled code."""
+        kind, word = self.numba_type.members[name]
+        assert kind == block.numba_type, name
+        object.__setattr__(self, name, block)
+        self._memory[word] = block.address  # type: ignore[attr-defined]
+
+    def named(self) -> dict[str, Any]:
+        """The fields' values by name; for a mutable number the array (1,) that holds it."""
+        held = vars(self)
+        return {each.name: held[each.name] for each in fields(self)}  # type: ignore[arg-type]
+
     def members(self) -> tuple[Any, ...]:
-        """The fields' values, in order."""
-        return tuple(getattr(self, field.name) for field in fields(self))
+        """The values of `named`, in order."""
+        return tuple(self.named().values())
+
+    def mutable_values(self) -> dict[str, float]:
+        """The values of all mutable numbers by name."""
+        return {name: getattr(self, name) for name in self.mutable}
+
+    def replace(self, **changes: Any) -> Self:
+        """A block with these members, which shares all others: mutable numbers, too."""
+        return type(self)(**{**self.named(), **changes})
+
+    def clear(self) -> None:
+        """Write zeros into all mutable numbers and arrays, not those of blocks within it."""
+        for value in self.members():
+            if isinstance(value, np.ndarray):
+                value[...] = 0
+
+    def memory_of(self, name: str) -> Any:
+        """The memory of a mutable number, an array (1,): another block may be made with it."""
+        assert name in self.mutable, name
+        return vars(self)[name]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), tuple(portable(member) for member in self.members())
 
     def __copy__(self) -> Any:
         return type(self)(*self.members())
+
+
+def named_entries(kind: type[Block]) -> tuple[Any, ...]:
+    """Members of a block whose first one is an array of zeros, and all others are its entries.
+
+    Code that needs a vector takes the array, and code that needs one entry its name.
+    """
+    names = list(kind.mutable)
+    values = guarded_zeros(len(names))
+    return values, *(values[i : i + 1] for i in range(len(names)))
 
 
 def _length(part: int | str, sizes: Mapping[str, int]) -> int:
@@ -110,7 +182,7 @@ def _length(part: int | str, sizes: Mapping[str, int]) -> int:
     return int(found[1] or 1) * sizes[found[2]] + int(found[3] or 0)
 
 
-def _words(value: Any) -> tuple[types.Type, list[int]]:
+def _words(value: Any) -> tuple[Any, list[int]]:
     """Numba's type of a field, and its 64-bit words."""
     if isinstance(value, Block):
         return value.numba_type, [value.address]
@@ -137,6 +209,14 @@ def _array_type(array: np.ndarray) -> types.Type:
 @cache
 def _contiguous(dtype: np.dtype, dimensions: int, readonly: bool) -> types.Array:
     return types.Array(numpy_support.from_dtype(dtype), dimensions, "C", readonly=readonly)
+
+
+class MutableType(types.Type):
+    """Numba's type of a mutable number in a block, which holds its address."""
+
+    def __init__(self, dtype: types.Type):
+        self.dtype = dtype
+        super().__init__(f"Mutable({dtype})")
 
 
 class BlockType(types.Type):
@@ -172,20 +252,22 @@ class BlockAttributes(AttributeTemplate):
     key = BlockType
 
     def generic_resolve(self, kind: BlockType, name: str) -> types.Type | None:
-        return kind.members[name][0] if name in kind.members else None
+        if name not in kind.members:
+            return None
+        member = kind.members[name][0]
+        return member.dtype if isinstance(member, MutableType) else member
 
 
 @lower_getattr_generic(BlockType)
 def _member(context: Any, builder: Any, kind: BlockType, block: Any, name: str) -> Any:
     member, first = kind.members[name]
-    words = builder.bitcast(block, llvmlite.ir.IntType(64).as_pointer())
 
     def word(k: int) -> Any:
-        loaded = builder.load(cgutils.gep_inbounds(builder, words, first + k))
-        # never written after the block was made: loops need not read it again
-        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return loaded
+        return _word(builder, block, first + k)
 
+    if isinstance(member, MutableType):
+        place = _place(context, builder, member, word(0))
+        return context.unpack_value(builder, member.dtype, place)
     if isinstance(member, BlockType):
         return builder.inttoptr(word(0), block.type)
     if isinstance(member, types.Array):
@@ -195,6 +277,29 @@ def _member(context: Any, builder: Any, kind: BlockType, block: Any, name: str) 
     if member == types.boolean:
         return builder.trunc(word(0), llvmlite.ir.IntType(1))
     return word(0)
+
+
+@lower_setattr_generic(BlockType)
+def _assign(context: Any, builder: Any, signature: Any, args: Any, name: str) -> None:
+    member, first = signature.args[0].members[name]
+    if not isinstance(member, MutableType):
+        raise TypingError(f"{name!r} of {signature.args[0]} is not mutable")
+    place = _place(context, builder, member, _word(builder, args[0], first))
+    context.pack_value(builder, member.dtype, args[1], place)
+
+
+def _word(builder: Any, block: Any, k: int) -> Any:
+    """The 64-bit word k of a block, which is never written after the block was made."""
+    words = builder.bitcast(block, llvmlite.ir.IntType(64).as_pointer())
+    loaded = builder.load(cgutils.gep_inbounds(builder, words, k))
+    # so loops need not read it again
+    loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return loaded
+
+
+def _place(context: Any, builder: Any, kind: MutableType, address: Any) -> Any:
+    """A pointer to a mutable number."""
+    return builder.inttoptr(address, context.get_data_type(kind.dtype).as_pointer())
 
 
 def _array(context: Any, builder: Any, kind: types.Array, word: Any) -> Any:

@@ -118,6 +118,20 @@ def call(typing: Any, address: Any, block: Any) -> Any:
 
 
 @intrinsic
+def call_named(typing: Any, function: Any, address: Any, block: Any) -> Any:
+    """`function(block)` by its address: as `call`, for a reader who wants to know what is called.
+
+    Nothing of `function` is compiled here; whoever made the block took the address of this one.
+    """
+    _, generate = _calling(types.none, address, block)
+
+    def without_function(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return generate(context, builder, signature, args[1:])
+
+    return types.none(function, address, block), without_function
+
+
+@intrinsic
 def value_of(typing: Any, address: Any, block: Any) -> Any:
     """The float that `kernel(block)` returns, otherwise as `call`."""
     return _calling(types.float64, address, block)
@@ -140,6 +154,10 @@ class Program(Block):
         program = cls(np.array(rows, dtype=np.int64).reshape(-1, 2))
         object.__setattr__(program, "_calls", calls)  # it keeps the blocks
         return program
+
+    def blocks(self) -> list[Any]:
+        """The blocks of its kernels, in order."""
+        return [call[1] for call in self._calls if call]  # type: ignore[attr-defined]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self)._linked, (self._calls,)  # type: ignore[attr-defined]

@@ -7,7 +7,7 @@ import numpy as np
 GAP = 64  # 512 bytes: more than a vector loop handles at once
 
 
-def guarded_zeros(shape: int | tuple[int, ...], dtype: type = float) -> np.ndarray:
+def guarded_zeros(shape: int | tuple[int, ...], dtype: np.dtype | type = float) -> np.ndarray:
     """Zeros with unused room on both sides, for whatever compiled code writes to.
 
     A vector loop first looks how far apart its arrays lie, and where one follows another within a

@@ -10,6 +10,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.easing import eased
 from poise.envs.compiled.maths.noise import uniform
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.robots.description import match_names
 from poise.envs.robots.models.tree import lineage
 from poise.envs.robots.robot import Robot
@@ -49,20 +50,20 @@ def find_arms(robot: Robot) -> tuple[Arm, ...]:
     return tuple(arms)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class MovedArms(Block):
     """Externally commanded servos on the motors of both arms (n)."""
 
     robot: RobotArrays
     views: SimViews
     motors: np.ndarray  # (n,) int: of the arms
-    moved: Annotated[np.ndarray, 1, np.int64]  # 1 where external commands move them
-    step: Annotated[np.ndarray, 1, np.int64]  # physics steps since the reset
+    moved: Mutable[int]  # 1 where external commands move them
+    step: Mutable[int]  # physics steps since the reset
     period: int  # physics steps from one posture to the next
     seed: Annotated[np.ndarray, 1, np.uint64]  # see `uniform`
     stand: np.ndarray  # (n,) standing posture [rad]
     reach: np.ndarray  # (n, 2) the way from there to the joint's limits [rad]
-    part: Annotated[np.ndarray, 1]  # of that way
+    part: Mutable[float]  # of that way
     last: Annotated[np.ndarray, "n"]  # posture that is left [rad]
     goal: Annotated[np.ndarray, "n"]  # posture that is next [rad]
     inertia: np.ndarray  # (n,) of each joint, standing [kg·m²]
@@ -90,7 +91,7 @@ def allocate_arms(simulation: Simulation, known: Simulation) -> MovedArms:
 
 def begin_arms(a: MovedArms, part: float, seed: int) -> None:
     """Start an episode from the standing posture; without external commands `part` is 0."""
-    a.part[0], a.moved[0], a.step[0] = part, int(part > 0.0), 0
+    a.part, a.moved, a.step = part, int(part > 0.0), 0
     a.seed[0], a.goal[:] = seed, a.stand
 
 
@@ -102,15 +103,15 @@ def move_arms(a: MovedArms):
     with the least jerk: τ = I ω² (q* − q) − 2 I ω q̇, within the motor's limit. `views.ctrl` stays
     what the controller asks for.
     """
-    if not a.moved[0]:
+    if not a.moved:
         return
-    within = a.step[0] % a.period
-    a.step[0] += 1
+    within = a.step % a.period
+    a.step += 1
     for k in range(a.motors.shape[0]):
         if within == 0:
             a.last[k] = a.goal[k]
             way = a.reach[k, 0] + uniform(a.seed) * (a.reach[k, 1] - a.reach[k, 0])
-            a.goal[k] = a.stand[k] + a.part[0] * way
+            a.goal[k] = a.stand[k] + a.part * way
         i = a.motors[k]
         dof, most = a.robot.motor_dofs[i], a.robot.torque_limit[i]
         target = a.last[k] + (a.goal[k] - a.last[k]) * eased(within / a.period)

@@ -46,7 +46,7 @@ class RobotArrays(Block):
     M_colind: np.ndarray
     ground_sensor: int  #: address in `sensordata`: contacts of anything with the ground
     sole_sensor: np.ndarray  #: (nc,) addresses: contacts of that foot with the ground
-    surfaces: np.ndarray  #: (n, 6) of the terrain, see `Surface`; none on level ground
+    surfaces: np.ndarray  #: (n,) of the terrain, see `surface_arrays`; none on level ground
     floor: float  #: height of the ground where there is no surface [m]
     edge_sensor: np.ndarray  #: (nc,) addresses: directions of that foot's contacts, on a terrain
 

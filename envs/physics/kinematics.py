@@ -17,6 +17,7 @@ from poise.envs.compiled.maths.pendulum import compiled_rate
 from poise.envs.compiled.maths.polygons import convex_hull
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import GAP, guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.robots.ground import SLOTS
 from poise.envs.robots.soles import MAX_VERTICES
 from poise.envs.terrain.arrays import ground_height, surface_below, surface_height
@@ -28,7 +29,7 @@ STEEP = 0.7  # of the vertical part of a contact's direction, below which it is 
 EDGE = 0.005  # [m] between surfaces from which their border is an edge
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class StateArrays(Block):
     """Storage of one robot state; see `RobotState` for the meaning of each name."""
 
@@ -43,7 +44,7 @@ class StateArrays(Block):
     A: Annotated[np.ndarray, 6, "nv"]
     A_bias: Annotated[np.ndarray, 6]
     load: Annotated[np.ndarray, 3]  # estimated sustained load: f_z, and n_x, n_y about the CoM
-    friction: Annotated[np.ndarray, 1]  # estimated, of the ground, over the model's
+    friction: Mutable[float]  # estimated, of the ground, over the model's
     J: Annotated[np.ndarray, "6nc", "nv"]
     Jdot_v: Annotated[np.ndarray, "6nc"]
     J_v: Annotated[np.ndarray, "6nc"]
@@ -54,11 +55,11 @@ class StateArrays(Block):
     contact_wrench: Annotated[np.ndarray, 6]
     cop: Annotated[np.ndarray, 2]
     capture_point: Annotated[np.ndarray, 2]
-    omega: Annotated[np.ndarray, 1]
+    omega: Mutable[float]
     contacts: Annotated[np.ndarray, "nc"]
-    other_contacts: Annotated[np.ndarray, 1]
+    other_contacts: Mutable[float]
     support: Annotated[np.ndarray, "corners", 2]
-    support_size: Annotated[np.ndarray, 1, np.int64]
+    support_size: Mutable[int]
     body_position: Annotated[np.ndarray, "nb", 3]
     body_axes: Annotated[np.ndarray, "nb", 3, 3]
     dof_axes: Annotated[np.ndarray, "nv", 6]
@@ -75,7 +76,7 @@ def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
     sizes = {"nv": nv, "nc": nc, "nb": nb, "corners": MAX_VERTICES * nc}
     qpos, qvel = guarded_zeros(nv + 1), guarded_zeros(nv)
     s = StateArrays.allocate(sizes, qpos=qpos, qvel=qvel, motor_q=qpos[7:], motor_dq=qvel[6:])
-    s.friction[0] = 1.0
+    s.friction = 1.0
     return s
 
 
@@ -218,15 +219,15 @@ def _contact(robot: RobotArrays, views: SimViews, s: StateArrays):
     else:  # no support: there is no CoP; the middle of the soles is what can be reached next
         s.cop[0], s.cop[1] = s.origin[0], s.origin[1]
     height = max(s.com[2] - s.origin[2], 0.2 * robot.height_com)
-    s.omega[0] = compiled_rate(robot.gravity, height)
+    s.omega = compiled_rate(robot.gravity, height)
     for a in range(2):
-        s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega[0]
+        s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega
     feet = 0.0
     for i in range(s.contacts.shape[0]):
         found = views.sensordata[robot.sole_sensor[i]]
         s.contacts[i] = 1.0 if found > 0.0 else 0.0
         feet += found
-    s.other_contacts[0] = views.sensordata[robot.ground_sensor] - feet
+    s.other_contacts = views.sensordata[robot.ground_sensor] - feet
 
 
 @compiled
@@ -266,9 +267,9 @@ def stand_on_terrain(robot: RobotArrays, views: SimViews, s: StateArrays):
         for a in range(2):
             s.cop[a] += s.origin[2] * s.contact_wrench[a] / fz
     above = max(s.com[2] - s.origin[2], 0.2 * robot.height_com)
-    s.omega[0] = compiled_rate(robot.gravity, above)
+    s.omega = compiled_rate(robot.gravity, above)
     for a in range(2):
-        s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega[0]
+        s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega
 
 
 @compiled
@@ -318,14 +319,14 @@ def update_support(robot: RobotArrays, s: StateArrays):
     size = convex_hull(points, n, 0.0, hull)
     for i in range(size):
         s.support[i, 0], s.support[i, 1] = hull[i, 0], hull[i, 1]
-    s.support_size[0] = size
+    s.support_size = size
 
 
 @compiled
 def support_distance(s: StateArrays, x: float, y: float) -> float:
     """Signed distance [m] from (x, y) to the support polygon's edge, > 0 inside."""
     distance = np.inf
-    size = s.support_size[0]
+    size = s.support_size
     for i in range(size):
         ax, ay = s.support[i, 0], s.support[i, 1]
         ex = s.support[(i + 1) % size, 0] - ax

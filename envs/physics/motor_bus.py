@@ -7,9 +7,10 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class MotorBus(Block):
     """The readings of the motors' encoders, and what the motors are asked for where servos run.
 
@@ -18,7 +19,7 @@ class MotorBus(Block):
 
     q: Annotated[np.ndarray, "nj"]  # joint positions that the motors read now [rad]
     dq: Annotated[np.ndarray, "nj"]  # joint velocities, also read now [rad/s]
-    servoed: Annotated[np.ndarray, 1, np.int64]  # 1 where motors are asked for what follows
+    servoed: Mutable[int]  # 1 where motors are asked for what follows
     torque: Annotated[np.ndarray, "nu"]  # u [N·m] of τ = u + K (q* − q) − D q̇
     target: Annotated[np.ndarray, "nu"]  # q* [rad]
     stiffness: Annotated[np.ndarray, "nu"]  # K [N·m/rad]
@@ -37,4 +38,4 @@ def ask_servo(
     """Ask motor i for τ = `torque` + `stiffness` (`target` − q) − `damping` q̇."""
     bus.torque[i], bus.target[i] = torque, target
     bus.stiffness[i], bus.damping[i] = stiffness, damping
-    bus.servoed[0] = 1
+    bus.servoed = 1

@@ -15,10 +15,11 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
 from poise.envs.physics.engines.engine import Engine
 from poise.envs.physics.pushes.push import Kick, Push
-from poise.envs.physics.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
+from poise.envs.physics.pushes.table import ROW, apply_kicks, apply_pushes, pack
 from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews, robot_arrays, sim_views
+from .clock import Clock
 from .kinematics import StateArrays, allocate_state, update_state
 from .motor_bus import MotorBus, ideal_bus
 from .state import RobotState
@@ -31,17 +32,16 @@ def advance(
     robot: RobotArrays,
     views: SimViews,
     pushes: np.ndarray,
-    clock: np.ndarray,
+    clock: Clock,
     stepper: CallbackAddress,
 ):
     """Take one physics step with the controls in `views.ctrl`.
 
     Enters and leaves with the position and velocity stages current, so whoever reads the state
-    needs no second pass. `clock` (1,) counts steps since the reset. `stepper` is that of the
-    simulation's `Engine`.
+    needs no second pass. `stepper` is that of the simulation's `Engine`.
     """
     dt = robot.timestep
-    t = clock[0] * dt
+    t = clock.steps * dt
     views.xfrc_applied[:, :] = 0.0
     apply_pushes(pushes, t, dt, views.xfrc_applied, views.xmat)
     if stepper == 0:
@@ -49,7 +49,7 @@ def advance(
     else:
         call_back(stepper)
     apply_kicks(pushes, t, dt, views.qvel)
-    clock[0] += 1
+    clock.steps += 1
     mj_step1(views.model_address, views.data_address)
 
 
@@ -60,7 +60,7 @@ class World(Block):
     robot: RobotArrays
     views: SimViews
     state: StateArrays
-    clock: np.ndarray  # (1,) int: physics steps since the reset
+    clock: Clock
     pushes: np.ndarray  # see `apply_pushes`
     motors: Program  # what comes of the controls, before each physics step
     sensors: Program  # what measures, after each physics step
@@ -94,10 +94,10 @@ class Simulation(Copyable):
         self.arrays = robot_arrays(robot)
         self.views = sim_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles), robot.model.nbody)
-        self.clock = guarded_zeros(1, dtype=np.int64)
+        self.clock = Clock(0)
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
-        self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
+        self.push_table = guarded_zeros(SOME_PUSHES, ROW)
         self._engine = Engine(robot, self.data)
         self._world: World | None = None
         self.equip(Program.of(()), Program.of(()), ideal_bus())
@@ -142,7 +142,7 @@ class Simulation(Copyable):
     @property
     def time(self) -> float:
         """Seconds since the reset."""
-        return float(self.clock[0] * self.arrays.timestep)
+        return float(self.clock.steps * self.arrays.timestep)
 
     @property
     def state(self) -> RobotState:
@@ -166,7 +166,7 @@ class Simulation(Copyable):
         mujoco.mj_normalizeQuat(self.model, self.data.qpos)
         mujoco.mj_forward(self.model, self.data)
         self._engine.begin()
-        self.clock[0] = 0
+        self.clock.steps = 0
         self.state_arrays.edges[:] = 0.0
         update_state(self.arrays, self.views, self.state_arrays)
         self.start_yaw = self.state.heading_yaw
@@ -181,8 +181,8 @@ class Simulation(Copyable):
         self.pushes = tuple(pushes)
         table = pack(self.pushes, self.robot, self.start_yaw)
         if len(table) > len(self.push_table):  # seldom: compiled code is bound to the table
-            self.push_table = guarded_zeros((2 * len(table), TABLE_COLUMNS))
-        self.push_table[:] = 0.0
+            self.push_table = guarded_zeros(2 * len(table), ROW)
+        self.push_table[:] = np.zeros((), ROW)
         self.push_table[: len(table)] = table
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:

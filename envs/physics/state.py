@@ -114,7 +114,7 @@ class RobotState(Copyable):
     @property
     def friction(self) -> float:
         """Estimated friction of the ground, over that of the model; it scales the cones."""
-        return float(self.arrays.friction[0])
+        return self.arrays.friction
 
     @property
     def Adot_v(self) -> np.ndarray:
@@ -136,18 +136,18 @@ class RobotState(Copyable):
     @property
     def omega(self) -> float:
         """ω = √(g/z_c) [1/s]."""
-        return float(self.arrays.omega[0])
+        return self.arrays.omega
 
     @property
     def other_contact(self) -> bool:
         """True where anything but the feet touches the ground."""
-        return bool(self.arrays.other_contacts[0] > 0.5)
+        return bool(self.arrays.other_contacts > 0.5)
 
     @property
     def support_polygon(self) -> np.ndarray:
         """(k, 2) counter-clockwise hull of all soles but swing feet [m]."""
         update_support(self.robot, self.arrays)
-        return self.arrays.support[: self.arrays.support_size[0]].copy()
+        return self.arrays.support[: self.arrays.support_size].copy()
 
     def support_distance(self, point: np.ndarray) -> float:
         """Signed distance [m] from a ground point (2,) to the polygon's edge, > 0 inside."""

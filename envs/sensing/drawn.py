@@ -11,7 +11,6 @@ from poise.envs.physics.arms import ROLES, find_arms
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, on_terrain
-from poise.envs.terrain.arrays import HEIGHT
 from poise.envs.terrain.building import BUILT
 from poise.envs.terrain.bumps import Bumps
 
@@ -218,7 +217,7 @@ class Plant:
         model, surfaces = self.simulation.model, self.simulation.arrays.surfaces
         rng = np.random.default_rng(drawn.seed)
         heights = drawn.bumps * np.maximum(rng.uniform(-1.0, 1.0, len(surfaces) - 1), 0.0)
-        surfaces[1:, HEIGHT] = heights
+        surfaces["height"][1:] = heights
         model.geom_pos[self._bumps, 2] -= HIGHEST - np.where(heights > 0.0, heights, -HIGHEST)
 
 

@@ -17,6 +17,7 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
 from poise.envs.compiled.mujoco_calls import mj_step1
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arms import allocate_arms, begin_arms, move_arms
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
@@ -30,22 +31,21 @@ from .config import EstimatorConfig
 from .drawn import DrawnRobot, Plant
 from .external_force import ExternalForce, bear_load, begin_force, keep_load, observe_force
 from .friction import SlidingFriction, allocate_friction, begin_friction, learn_friction
-from .inekf import Invariant, begin_invariant, follow_invariant
+from .inekf import Invariant, allocate_invariant, begin_invariant, follow_invariant
 from .measurement import RING, Rings, Sensors, arrived, begin_sensors, measure
-from .motors import Motors, begin_motors, drive_motors
+from .motors import MotorHistory, Motors, begin_motors, drive_motors
 from .odometry import Odometry, begin_odometry, copy_axes, follow_measurements
-from .prediction import Promises, Rollout, keep_promises, predict, roll_out
+from .promises import Promises, keep_promises, predict
 from .realism import Realism
+from .rollout import Rollout, roll_out
 
-#: entries of `Estimation.steps`
-SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(8)
-#: `Estimation.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
+#: `Estimation.simulated`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
 WITHOUT_CONTACTS: WeakKeyDictionary[Robot, Robot] = WeakKeyDictionary()
 SINK = 0.05  # of the height error of the soles that a tick takes away
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Estimation(Block):
     """The block of `estimate_state`."""
 
@@ -58,7 +58,14 @@ class Estimation(Block):
     rollout: Rollout
     force: ExternalForce
     friction: SlidingFriction
-    steps: Annotated[np.ndarray, 8, np.int64]  # physics steps, see SENSE and its like
+    sense: Mutable[int]  # physics steps by which measurements are late
+    earlier: Mutable[int]  # by which what acts was asked for before
+    horizon: Mutable[int]  # that are predicted
+    exact: Mutable[bool]  # the true state is known
+    simulated: Mutable[int]  # see `SIMULATES`
+    invariant_filter: Mutable[bool]  # the velocity is that of `invariant`, not of `odometry`
+    pushed: Mutable[bool]  # the external force is estimated
+    loaded: Mutable[bool]  # what of it lasts is borne
     axes: Annotated[np.ndarray, 3, 3]  # of the root, predicted
     q: Annotated[np.ndarray, "nj"]  # predicted
     v: Annotated[np.ndarray, "nv"]
@@ -69,48 +76,48 @@ class Estimation(Block):
 def estimate_state(b: Estimation):
     """Estimate the state of the nominal robot from the measurements until now."""
     r, o = b.rings, b.odometry
-    now = r.count[0] - 1
+    now = r.count - 1
     keep_promises(o.promises, now)
-    known = max(now - b.steps[SENSE], 0)
-    row = arrived(r, b.steps[SENSE])
-    if b.steps[EXACT]:
+    known = max(now - b.sense, 0)
+    row = arrived(r, b.sense)
+    if b.exact:
         copy_into(r.truth_qpos[row, :3], b.position)
         axes_of(r.truth_qpos[row, 3:7], b.axes)
         copy_into(r.truth_qpos[row, 7:], b.q)
         copy_into(r.truth_qvel[row], b.v)
     else:
-        if b.steps[INVARIANT]:
-            follow_invariant(b.invariant, known + 1, b.steps[EARLIER])
+        if b.invariant_filter:
+            follow_invariant(b.invariant, known + 1, b.earlier)
         else:
-            follow_measurements(o, known + 1, b.steps[EARLIER])
+            follow_measurements(o, known + 1, b.earlier)
         copy_into(o.position, b.position)
         copy_axes(o.axes, b.axes)
         copy_into(o.q, b.q)
         copy_into(o.v, b.v)
-        if b.steps[INVARIANT]:
+        if b.invariant_filter:
             for a in range(3):
                 b.v[3 + a] -= b.invariant.gyro_bias[a]
-    if b.steps[PUSHED] or b.steps[LOADED]:
+    if b.pushed or b.loaded:
         _write_state(b, row)
-        observe_force(b.force, b.robot, b.state, r, known, b.steps[EXACT] > 0)
-        if not b.steps[PUSHED]:
+        observe_force(b.force, b.robot, b.state, r, known, b.exact)
+        if not b.pushed:
             keep_load(b.force)
-    ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
-    if b.steps[HORIZON] > 0 and b.steps[SIMULATED] + b.rollout.motors.bus.servoed[0] > 1:
+    ahead = b.horizon - b.sense + now - known  # at an episode's start less is late
+    if b.horizon > 0 and b.simulated + b.rollout.motors.bus.servoed > 1:
         roll_out(
-            b.rollout, known, ahead, b.steps[EARLIER], b.force.wrench,
+            b.rollout, known, ahead, b.earlier, b.force.wrench,
             b.position, b.axes, b.q, b.v,
         )  # fmt: skip
-    elif b.steps[HORIZON] > 0:
+    elif b.horizon > 0:
         predict(
-            o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep,
+            o.promises, known, ahead, b.earlier, b.robot.timestep,
             b.position, b.axes, b.q, b.v,
         )  # fmt: skip
     _write_state(b, row)
-    if not b.steps[EXACT]:
+    if not b.exact:
         _stand_on_ground(b)
     learn_friction(b.friction, b.robot, b.state, r, row)
-    if b.steps[LOADED]:
+    if b.loaded:
         bear_load(b.force, b.robot, b.state)
 
 
@@ -144,8 +151,9 @@ def _stand_on_ground(b: Estimation):
             feet += 1
     if feet > 0:
         b.odometry.position[2] -= SINK * total / feet
-        for i in range(1, b.invariant.place.shape[0]):  # the position there, and the soles
-            b.invariant.place[i, 2] -= SINK * total / feet
+        b.invariant.position[2] -= SINK * total / feet
+        for i in range(b.invariant.soles.shape[0]):
+            b.invariant.soles[i, 2] -= SINK * total / feet
 
 
 class EstimatedState(StateSource, Copyable):
@@ -168,18 +176,17 @@ class EstimatedState(StateSource, Copyable):
         rings = Rings.allocate(sizes)
         self.sensors = Sensors.allocate(sizes, **world, rings=rings)
         self.bus = self.sensors.bus
-        self.motors = Motors.allocate(sizes, **world)
+        self.motors = Motors.allocate(sizes, **world, asked=MotorHistory.allocate(sizes))
         self.arms = allocate_arms(plant.simulation, self.known)
-        self.known.state_arrays = replace(
-            self.known.state_arrays, motor_q=self.bus.q, motor_dq=self.bus.dq
+        self.known.state_arrays = self.known.state_arrays.replace(
+            motor_q=self.bus.q, motor_dq=self.bus.dq
         )
         self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays
         promises = Promises.allocate({"n": RING, **sizes})
         self.promise = promises.last
         own = {"robot": self.arrays, "state": self.state_arrays, "rings": rings}
         self.odometry = Odometry.allocate(sizes, **own, promises=promises)
-        errors = {"n": 15 + 3 * sizes["nc"], **sizes}
-        self.invariant = Invariant.allocate(errors, odometry=self.odometry)
+        self.invariant = allocate_invariant(self.odometry, sizes)
         self.estimation = Estimation.allocate(
             sizes,
             **own,
@@ -211,16 +218,16 @@ class EstimatedState(StateSource, Copyable):
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
         pushed = c.external_force and horizon > 0 and SIMULATES[c.predictor] > 0
         loaded = c.load and (drawn.measured or drawn.loaded)
-        self.estimation.steps[:] = (
-            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf", pushed,
-            loaded,
-        )  # fmt: skip
+        b = self.estimation
+        b.sense, b.earlier, b.horizon = drawn.sense, earlier, horizon
+        b.exact, b.simulated = exact, SIMULATES[c.predictor]
+        b.invariant_filter, b.pushed, b.loaded = c.kind == "inekf", pushed, loaded
         self._begin_estimate()
 
     def _begin_estimate(self) -> None:
         """Set out from what was measured before the episode."""
-        loaded = self.estimation.steps[LOADED] > 0
-        begin_force(self.estimation.force, self.config.load_time if loaded else 0.0)
+        estimation = self.estimation
+        begin_force(estimation.force, self.config.load_time if estimation.loaded else 0.0)
         self.state_arrays.load[:] = 0.0
         begin_friction(self.estimation.friction, self.state_arrays, self.config.slide_speed)
         begin_odometry(self.odometry, self.drawn.noise, self.config)

@@ -19,6 +19,7 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -34,7 +35,7 @@ CLIP, MOST = 0.05, 0.4  # of the weight: by which the mean is off at most, and w
 ARM = 0.2  # [h] at which such a part of the weight makes a moment
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class ExternalForce(Block):
     """The wrench that nothing explains: force [N] and moment about the CoM [N·m], world axes."""
 
@@ -44,9 +45,9 @@ class ExternalForce(Block):
     momentum: Annotated[np.ndarray, 6]  # at the physics step `seen`
     mean: Annotated[np.ndarray, 3]  # f_z, n_x, n_y over `QUICK`
     load: Annotated[np.ndarray, 3]  # what of them lasts
-    time: Annotated[np.ndarray, 1]  # in which that is learned [s]
-    seen: Annotated[np.ndarray, 1, np.int64]  # -1 before the first one
-    ticks: Annotated[np.ndarray, 1, np.int64]  # wrenches until now
+    time: Mutable[float]  # in which that is learned [s]
+    seen: Mutable[int]  # -1 before the first one
+    ticks: Mutable[int]  # wrenches until now
 
 
 def begin_force(e: ExternalForce, load_time: float) -> None:
@@ -54,10 +55,9 @@ def begin_force(e: ExternalForce, load_time: float) -> None:
 
     A load is learned in `load_time` [s], or not at all if that is 0.
     """
-    e.time[0] = load_time
-    for array in (e.wrench, e.smooth, e.noise, e.mean, e.load, e.ticks):
-        array[:] = 0
-    e.seen[0] = -1
+    for array in (e.wrench, e.smooth, e.noise, e.mean, e.load):
+        array[:] = 0.0
+    e.time, e.seen, e.ticks = load_time, -1, 0
 
 
 @compiled
@@ -68,18 +68,18 @@ def observe_force(
 
     Where the state is not `exact`, the wrench is low-passed and weighed by `_weigh`.
     """
-    steps, n = now - e.seen[0], r.wrench.shape[0]
+    steps, n = now - e.seen, r.wrench.shape[0]
     if steps <= 0:
         return
-    if e.seen[0] >= 0:
+    if e.seen >= 0:
         dt = steps * robot.timestep
         for a in range(6):
             e.wrench[a] = (s.momentum[a] - e.momentum[a]) / dt
         e.wrench[2] += robot.mass * robot.gravity
         _take_ground(e, s, r, now, min(steps, n))
-        if e.time[0] > 0.0:
+        if e.time > 0.0:
             _learn_load(e, robot, dt)
-        e.ticks[0] += 1
+        e.ticks += 1
         if not exact:
             for a in range(3):
                 e.wrench[2 + a] -= e.load[a]
@@ -88,7 +88,7 @@ def observe_force(
                 e.wrench[2 + a] += e.load[a]
     for a in range(6):
         e.momentum[a] = s.momentum[a]
-    e.seen[0] = now
+    e.seen = now
 
 
 @compiled
@@ -103,7 +103,7 @@ def keep_load(e: ExternalForce):
 def _take_ground(e: ExternalForce, s: StateArrays, r: Rings, now: int, steps: int):
     """Subtract the ground's wrench about the CoM, the mean of `steps` measurements."""
     n, R = r.wrench.shape[0], s.root_axes
-    newest = r.next[0] - 1 - (r.count[0] - 1 - now)
+    newest = r.next - 1 - (r.count - 1 - now)
     x, y, z = s.qpos[0] - s.com[0], s.qpos[1] - s.com[1], s.qpos[2] - s.com[2]
     for i in range(steps):
         w = r.wrench[(newest - i) % n]
@@ -128,14 +128,14 @@ def _weigh(e: ExternalForce, dt: float):
     σ² is the mean square of what has been seen, of which what is above CLEAR σ counts as that: the
     errors of a robot that steps grow at once, and are not to be taken for a push.
     """
-    rate = max(1.0 / e.ticks[0], dt / MEMORY)
+    rate = max(1.0 / e.ticks, dt / MEMORY)
     for part in range(2):
         square, most = 0.0, CLEAR * CLEAR * e.noise[part]
         for a in range(3 * part, 3 * part + 3):
             e.smooth[a] += SMOOTHING * (e.wrench[a] - e.smooth[a])
             square += e.smooth[a] * e.smooth[a]
         weight = 0.0
-        if e.ticks[0] > LEARNING and square > most:
+        if e.ticks > LEARNING and square > most:
             weight, square = 1.0 - most / square, most
         e.noise[part] += rate * (square - e.noise[part])
         for a in range(3 * part, 3 * part + 3):
@@ -151,7 +151,7 @@ def _learn_load(e: ExternalForce, robot: RobotArrays, dt: float):
     so that a push, which is over soon, counts little.
     """
     weight = robot.mass * robot.gravity
-    gentle, rate = dt / (QUICK + dt), dt / max(min(e.ticks[0] * dt, e.time[0]), START)
+    gentle, rate = dt / (QUICK + dt), dt / max(min(e.ticks * dt, e.time), START)
     for a in range(3):
         unit = weight if a == 0 else ARM * weight * robot.height_com
         e.mean[a] += gentle * (e.wrench[2 + a] - e.mean[a])

@@ -7,12 +7,10 @@ along and across is the friction [Caron15]. Before it slides the estimate is the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
-
-import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.ground import contact_friction
@@ -26,14 +24,14 @@ BEARS = 0.2  # of the weight, that they bear at least
 LEAST = 0.3  # of the friction of the model: the least estimate
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class SlidingFriction(Block):
     """Measurements of the friction while soles slid."""
 
     known: float  # friction of the model
-    speed: Annotated[np.ndarray, 1]  # from which a sole is taken to slide [m/s]; 0: never
-    last: Annotated[np.ndarray, 1]  # ratio of the tick before, if soles slid in it, else 0
-    measured: Annotated[np.ndarray, 1, np.int64]  # 1 once a sole has slid
+    speed: Mutable[float]  # from which a sole is taken to slide [m/s]; 0: never
+    last: Mutable[float]  # ratio of the tick before, if soles slid in it, else 0
+    measured: Mutable[int]  # 1 once a sole has slid
 
 
 def allocate_friction(robot: Robot) -> SlidingFriction:
@@ -45,8 +43,8 @@ def allocate_friction(robot: Robot) -> SlidingFriction:
 
 def begin_friction(f: SlidingFriction, s: StateArrays, speed: float) -> None:
     """Start an episode, in which nothing has slid; see `SlidingFriction.speed`."""
-    f.speed[0], f.last[0], f.measured[0] = speed, 0.0, 0
-    s.friction[0] = 1.0
+    f.speed, f.last, f.measured = speed, 0.0, 0
+    s.friction = 1.0
 
 
 @compiled
@@ -59,23 +57,23 @@ def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings
     of the sliding sole, as in the cone of the QP. The first value sets the estimate. Later ticks
     change it by little, since a sole that lands bears any force.
     """
-    slides = sliding_sole(s, f.speed[0]) if f.speed[0] > 0.0 else -1
+    slides = sliding_sole(s, f.speed) if f.speed > 0.0 else -1
     force, R, axes = rings.wrench[row], s.root_axes, s.sole_axes[slides]
     x, y, z = 0.0, 0.0, 0.0
     for a in range(3):
         world = R[a, 0] * force[0] + R[a, 1] * force[1] + R[a, 2] * force[2]
         x, y, z = x + axes[a, 0] * world, y + axes[a, 1] * world, z + axes[a, 2] * world
     if slides < 0 or z < BEARS * robot.mass * robot.gravity:
-        f.last[0] = 0.0
+        f.last = 0.0
         return
-    ratio, last = (abs(x) + abs(y)) / z, f.last[0]
-    f.last[0] = ratio
+    ratio, last = (abs(x) + abs(y)) / z, f.last
+    f.last = ratio
     if last > 0.0:
         value = 0.5 * PIVOTS * (last + ratio) / f.known
-        step = 1.0 if f.measured[0] == 0 else STEP
-        change = min(max(value - s.friction[0], -step), step)
-        s.friction[0] = min(max(s.friction[0] + change, LEAST), 1.0)
-        f.measured[0] = 1
+        step = 1.0 if f.measured == 0 else STEP
+        change = min(max(value - s.friction, -step), step)
+        s.friction = min(max(s.friction + change, LEAST), 1.0)
+        f.measured = 1
 
 
 @compiled

@@ -18,23 +18,24 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 
 from .config import EstimatorConfig
 from .measurement import DRIFT_TIME
 from .odometry import LOAD, START_SPEED, Odometry, copy_axes, keep_joints, place_pressure
-from .prediction import turn_axes
-
-V, P_, D = 0, 1, 2  # rows of `Invariant.place`; D is the first sole's
-#: entries of `Invariant.numbers`
-GYRO, FORCE, GYRO_WALK, FORCE_WALK, ATTITUDE, ENCODER, KINEMATICS, SLIDE, ROLL, LIFT = range(10)
+from .promises import turn_axes
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Invariant(Block):
     """The filter of a robot with nc soles; n = 15 + 3 nc errors."""
 
     odometry: Odometry  # whose joints, axes, position and velocity are filled
-    place: Annotated[np.ndarray, "nc+2", 3]  # v [m/s], p, d₁ … [m]
+    place: np.ndarray  # (nc + 2, 3) v, p, d₁ …, of which those that follow are parts
+    velocity: np.ndarray  # (3,) v of the root [m/s]
+    position: np.ndarray  # (3,) p of the root [m]
+    soles: np.ndarray  # (nc, 3) d₁ … [m]
     gyro_bias: Annotated[np.ndarray, 3]  # root axes [rad/s]
     force_bias: Annotated[np.ndarray, 3]  # root axes [m/s²]
     P: Annotated[np.ndarray, "n", "n"]
@@ -46,19 +47,38 @@ class Invariant(Block):
     error: Annotated[np.ndarray, "n"]  # ξ̂, ζ̂
     seen: Annotated[np.ndarray, 3]  # a sole from the root, root axes [m]
     quaternion: Annotated[np.ndarray, 4]
-    numbers: Annotated[np.ndarray, 10]  # see GYRO and its like
+    # noises: of the IMU, step to step, and of the walks of its biases
+    gyro: Mutable[float]  # [rad/s]
+    force: Mutable[float]  # [m/s²]
+    gyro_walk: Mutable[float]
+    force_walk: Mutable[float]
+    attitude: Mutable[float]  # of the measured one, as white noise [rad]
+    encoder: Mutable[float]  # [rad]
+    kinematics: Mutable[float]  # of a sole's place by the joints [m]
+    slide: Mutable[float]  # of a loaded sole [m/s]
+    roll: Mutable[float]  # [m] of a loaded sole that turns
+    lift: Mutable[float]  # of an unloaded one [m/s]
+
+
+def allocate_invariant(odometry: Odometry, sizes: dict[str, int]) -> Invariant:
+    """The filter of a robot, whose state is all zeros."""
+    place = guarded_zeros((sizes["nc"] + 2, 3))
+    return Invariant.allocate(
+        {"n": 15 + 3 * sizes["nc"]}, odometry=odometry, place=place, velocity=place[0],
+        position=place[1], soles=place[2:],
+    )  # fmt: skip
 
 
 def begin_invariant(f: Invariant, noises: dict[str, float], c: EstimatorConfig) -> None:
     """Start at the odometry's state, with what the sensors' noises are thought to be."""
-    own, noise, drift = c.invariant, f.numbers, noises["tilt_drift"]
+    own, drift = c.invariant, noises["tilt_drift"]
     white = drift * np.sqrt(2.0 * DRIFT_TIME / f.odometry.robot.timestep)
-    noise[GYRO] = noises["gyro_noise"]
-    noise[FORCE] = np.hypot(c.acceleration, noises["accelerometer_noise"])
-    noise[GYRO_WALK], noise[FORCE_WALK] = own.gyro_bias_walk, c.bias_walk
-    noise[ATTITUDE], noise[ENCODER] = np.hypot(own.attitude, white), noises["encoder_noise"]
-    noise[KINEMATICS], noise[SLIDE] = own.kinematics, own.slide
-    noise[ROLL], noise[LIFT] = own.roll, own.lift
+    f.gyro = noises["gyro_noise"]
+    f.force = np.hypot(c.acceleration, noises["accelerometer_noise"])
+    f.gyro_walk, f.force_walk = own.gyro_bias_walk, c.bias_walk
+    f.attitude, f.encoder = np.hypot(own.attitude, white), noises["encoder_noise"]
+    f.kinematics, f.slide = own.kinematics, own.slide
+    f.roll, f.lift = own.roll, own.lift
     begin_state(f, np.hypot(own.attitude, drift), START_SPEED, own.gyro_bias, c.bias)
 
 
@@ -67,14 +87,14 @@ def begin_state(f: Invariant, attitude: float, speed: float, gyro: float, force:
     """Start where the odometry's state is, with these deviations of R, v and the biases."""
     o, P = f.odometry, f.P
     n, nc = P.shape[0], f.place.shape[0] - 2
-    copy_into(o.v[:3], f.place[V])
-    copy_into(o.position, f.place[P_])
+    copy_into(o.v[:3], f.velocity)
+    copy_into(o.position, f.position)
     for i in range(nc):
         find_sole(f, i, o.q)
         for a in range(3):
-            f.place[D + i, a] = f.place[P_, a]
+            f.soles[i, a] = f.position[a]
             for b in range(3):
-                f.place[D + i, a] += o.axes[a, b] * f.seen[b]
+                f.soles[i, a] += o.axes[a, b] * f.seen[b]
     for r in range(n):
         for c in range(n):
             P[r, c] = 0.0
@@ -89,8 +109,8 @@ def follow_invariant(f: Invariant, last: int, earlier: int):
     """Take in all measurements up to the number `last`, as `follow_measurements` does."""
     o = f.odometry
     n, r = o.rings.q.shape[0], o.rings
-    for number in range(max(o.seen[0], last - n + 1), last):
-        row = (r.next[0] - r.count[0] + number + n) % n
+    for number in range(max(o.seen, last - n + 1), last):
+        row = (r.next - r.count + number + n) % n
         keep_joints(o, row, number - 1 - earlier)
         lead_on(f, r.gyro[row], r.force[row])
         place_pressure(o, row)
@@ -99,11 +119,11 @@ def follow_invariant(f: Invariant, last: int, earlier: int):
             wander(f, row, i)
             see_sole(f, row, i)
         make_symmetric(f.P)
-    o.seen[0] = max(last, o.seen[0])
+    o.seen = max(last, o.seen)
     quaternion_of(o.axes, f.quaternion)
     axes_of(f.quaternion, o.axes)
-    copy_into(f.place[V], o.v[:3])
-    copy_into(f.place[P_], o.position)
+    copy_into(f.velocity, o.v[:3])
+    copy_into(f.position, o.position)
 
 
 @compiled
@@ -124,16 +144,16 @@ def lead_on(f: Invariant, gyro: np.ndarray, force: np.ndarray):
     for a in range(3):
         for b in range(3):
             f.before[a, b] = 0.5 * (f.before[a, b] + R[a, b])
-    f.place[V, 2] -= dt * o.robot.gravity  # v + g dt, which both the state and its error go by
+    f.velocity[2] -= dt * o.robot.gravity  # v + g dt, which both the state and its error go by
     _lead_errors(f)
     _transpose(f.P)
     _lead_errors(f)
     _add_noise_of_imu(f)
     for a in range(3):
         for b in range(3):
-            f.place[V, a] += dt * R[a, b] * (force[b] - f.force_bias[b])
+            f.velocity[a] += dt * R[a, b] * (force[b] - f.force_bias[b])
     for a in range(3):
-        f.place[P_, a] += dt * f.place[V, a]
+        f.position[a] += dt * f.velocity[a]
 
 
 @compiled
@@ -181,30 +201,30 @@ def _transpose(P: np.ndarray):
 def _add_noise_of_imu(f: Invariant):
     """P ← P + G Gᵀ σ_g² dt² + … with the columns of a turn, G = (1, v × , p × + v × dt, d ×, 0, 0),
     of the accelerometer, (0, 1, dt), and of the biases' walks."""
-    P, G, x, s = f.P, f.B, f.place, f.numbers
+    P, G, x = f.P, f.B, f.place
     n, dt = P.shape[0], f.odometry.robot.timestep
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         for c in range(n):
             G[k, c] = 0.0
-        G[k, k] = s[GYRO] * dt
+        G[k, k] = f.gyro * dt
         for row in range(x.shape[0]):  # x × e_k
-            G[k, 3 + 3 * row + i] = s[GYRO] * dt * x[row, j]
-            G[k, 3 + 3 * row + j] = -s[GYRO] * dt * x[row, i]
+            G[k, 3 + 3 * row + i] = f.gyro * dt * x[row, j]
+            G[k, 3 + 3 * row + j] = -f.gyro * dt * x[row, i]
         for a in range(3):
             G[k, 6 + a] += dt * G[k, 3 + a]
     for r in range(n - 6):
         g0, g1, g2 = G[0, r], G[1, r], G[2, r]
         for c in range(n - 6):
             P[r, c] += g0 * G[0, c] + g1 * G[1, c] + g2 * G[2, c]
-    stir = (s[FORCE] * dt) ** 2
+    stir = (f.force * dt) ** 2
     for a in range(3):
         P[3 + a, 3 + a] += stir
         P[3 + a, 6 + a] += dt * stir
         P[6 + a, 3 + a] += dt * stir
         P[6 + a, 6 + a] += dt * dt * stir
-        P[n - 6 + a, n - 6 + a] += dt * s[GYRO_WALK] ** 2
-        P[n - 3 + a, n - 3 + a] += dt * s[FORCE_WALK] ** 2
+        P[n - 6 + a, n - 6 + a] += dt * f.gyro_walk**2
+        P[n - 3 + a, n - 3 + a] += dt * f.force_walk**2
 
 
 @compiled
@@ -222,13 +242,13 @@ def wander(f: Invariant, row: int, i: int):
     rx = axes[0, 0] * o.pressed[i, 0] + axes[0, 1] * o.pressed[i, 1]
     ry = axes[1, 0] * o.pressed[i, 0] + axes[1, 1] * o.pressed[i, 1]
     rz = axes[2, 0] * o.pressed[i, 0] + axes[2, 1] * o.pressed[i, 1]
-    doubt, load = f.numbers[LIFT] ** 2, o.pressed[i, LOAD]
+    doubt, load = f.lift**2, o.pressed[i, LOAD]
     if o.rings.found[row, i] > 0.0 and load > 0.0:
-        roll = f.numbers[SLIDE] ** 2 + f.numbers[ROLL] ** 2 * turning
+        roll = f.slide**2 + f.roll**2 * turning
         doubt = min(doubt, roll / (load * load))
-        f.place[D + i, 0] -= dt * (f.z[1] * rz - f.z[2] * ry)
-        f.place[D + i, 1] -= dt * (f.z[2] * rx - f.z[0] * rz)
-        f.place[D + i, 2] -= dt * (f.z[0] * ry - f.z[1] * rx)
+        f.soles[i, 0] -= dt * (f.z[1] * rz - f.z[2] * ry)
+        f.soles[i, 1] -= dt * (f.z[2] * rx - f.z[0] * rz)
+        f.soles[i, 2] -= dt * (f.z[0] * ry - f.z[1] * rx)
     for a in range(9 + 3 * i, 12 + 3 * i):
         f.P[a, a] += dt * doubt
 
@@ -237,7 +257,7 @@ def wander(f: Invariant, row: int, i: int):
 def see_attitude(f: Invariant, attitude: np.ndarray):
     """Correct by the attitude A = exp(δ) R of the IMU: log(R̂ Aᵀ) = ξ_R − δ, to first order.
 
-    δ drifts slowly; `ATTITUDE` is the deviation of white noise that is as bad in the long run.
+    δ drifts slowly; `attitude` is the deviation of white noise that is as bad in the long run.
     """
     R = f.odometry.axes
     for a in range(3):
@@ -245,7 +265,7 @@ def see_attitude(f: Invariant, attitude: np.ndarray):
         f.z[a] = 0.0
         for b in range(3):
             f.z[a] += 0.5 * (R[j, b] * attitude[i, b] - R[i, b] * attitude[j, b])
-            f.noise[a, b] = f.numbers[ATTITUDE] ** 2 if a == b else 0.0
+            f.noise[a, b] = f.attitude**2 if a == b else 0.0
     correct_error(f, 0, -1)
 
 
@@ -285,7 +305,7 @@ def see_sole(f: Invariant, row: int, i: int):
     o, s = f.odometry, f.odometry.state
     find_sole(f, i, o.rings.q[row])
     for a in range(3):
-        f.z[a] = f.place[P_, a] - f.place[D + i, a]
+        f.z[a] = f.position[a] - f.soles[i, a]
         for b in range(3):
             f.z[a] += o.axes[a, b] * f.seen[b]
             total = 0.0
@@ -293,8 +313,8 @@ def see_sole(f: Invariant, row: int, i: int):
                 d = o.robot.chain[i, k]
                 if d >= 6:
                     total += s.J[6 * i + a, d] * s.J[6 * i + b, d]
-            f.noise[a, b] = f.numbers[ENCODER] ** 2 * total
-        f.noise[a, a] += f.numbers[KINEMATICS] ** 2
+            f.noise[a, b] = f.encoder**2 * total
+        f.noise[a, a] += f.kinematics**2
     correct_error(f, 6, 9 + 3 * i)
 
 

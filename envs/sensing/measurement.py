@@ -17,6 +17,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.noise import add_noise, normal
 from poise.envs.compiled.maths.vectors import copy_into
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.motor_bus import MotorBus
 
@@ -24,18 +25,17 @@ from .drawn import DrawnRobot
 
 RING = 64  # physics steps that are remembered
 DRIFT_TIME = 1.0  # [s] correlation time of the attitude's drift
-ENCODER, VELOCITY, GYRO, ACCELEROMETER, DRIFT, FORCE, COP, BACKLASH = range(8)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Rings(Block):
     """The measurements of the last `RING` physics steps; nj joints, nc soles.
 
     `truth_qpos`, `truth_qvel` are what no sensor gives: only the estimator `exact` reads them.
     """
 
-    next: Annotated[np.ndarray, 1, np.int64]  # the row of the next measurement
-    count: Annotated[np.ndarray, 1, np.int64]  # measurements since the reset
+    next: Mutable[int]  # the row of the next measurement
+    count: Mutable[int]  # measurements since the reset
     attitude: Annotated[np.ndarray, RING, 3, 3]  # axes of the IMU in a frame whose z is up
     gyro: Annotated[np.ndarray, RING, 3]  # angular velocity, root axes [rad/s]
     force: Annotated[np.ndarray, RING, 3]  # specific force Rᵀ(a − g), root axes [m/s²]
@@ -47,7 +47,7 @@ class Rings(Block):
     truth_qvel: Annotated[np.ndarray, RING, "nv"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Sensors(Block):
     """The sensors of an episode's robot, and what they measure."""
 
@@ -55,7 +55,14 @@ class Sensors(Block):
     views: SimViews
     rings: Rings
     seed: Annotated[np.ndarray, 1, np.uint64]  # see `uniform`
-    noise: Annotated[np.ndarray, 8]  # deviations; play of the joints [rad]
+    encoder: Mutable[float]  # deviations of what is measured: of joint positions [rad]
+    velocity: Mutable[float]  # of joint velocities [rad/s]
+    gyro: Mutable[float]  # [rad/s]
+    accelerometer: Mutable[float]  # [m/s²]
+    tilt: Mutable[float]  # of the drift of the attitude [rad]
+    force: Mutable[float]  # of the ground's force [weight]
+    cop: Mutable[float]  # [m]
+    backlash: Mutable[float]  # play of the joints [rad]
     encoder_bias: Annotated[np.ndarray, "nj"]
     gyro_bias: Annotated[np.ndarray, 3]
     force_bias: Annotated[np.ndarray, 3]  # of the accelerometer
@@ -73,16 +80,15 @@ class Sensors(Block):
 def arrived(r: Rings, late: int) -> int:
     """The row of the newest measurement that is known, `late` physics steps after it was taken."""
     n = r.q.shape[0]
-    return (r.next[0] - 1 - min(late, n - 1) + n) % n
+    return (r.next - 1 - min(late, n - 1) + n) % n
 
 
 def begin_sensors(s: Sensors, drawn: DrawnRobot, model: mujoco.MjModel) -> None:
     """Start an episode; all that would have been measured before it is its start."""
     d = drawn.noise
-    s.noise[:] = (
-        d["encoder_noise"], d["velocity_noise"], d["gyro_noise"], d["accelerometer_noise"],
-        d["tilt_drift"], d["force_noise"], d["cop_noise"], drawn.backlash,
-    )  # fmt: skip
+    s.encoder, s.velocity, s.gyro = d["encoder_noise"], d["velocity_noise"], d["gyro_noise"]
+    s.accelerometer, s.tilt = d["accelerometer_noise"], d["tilt_drift"]
+    s.force, s.cop, s.backlash = d["force_noise"], d["cop_noise"], drawn.backlash
     s.seed[0] = drawn.seed
     s.encoder_bias[:], s.gyro_bias[:] = drawn.encoder_bias, drawn.gyro_bias
     s.force_bias[:] = drawn.accelerometer_bias
@@ -92,11 +98,11 @@ def begin_sensors(s: Sensors, drawn: DrawnRobot, model: mujoco.MjModel) -> None:
     s.drift[:] = 0.0
     s.play[:] = 0.0
     s.last_q[:], s.last_velocity[:] = s.views.qpos[7:], s.views.qvel[:3]
-    add_noise(s.seed, s.noise[DRIFT], s.drift)
-    s.rings.next[0] = 0
+    add_noise(s.seed, s.tilt, s.drift)
+    s.rings.next = 0
     for _ in range(RING):
         measure(s)
-    s.rings.count[0] = 1
+    s.rings.count = 1
 
 
 def rotation(vector: np.ndarray) -> np.ndarray:
@@ -121,9 +127,9 @@ def levelling(gravity: np.ndarray) -> np.ndarray:
 @compiled
 def measure(s: Sensors):
     """Write what the sensors read now over the oldest measurement."""
-    r, k = s.rings, s.rings.next[0]
-    r.next[0] = (k + 1) % r.q.shape[0]
-    r.count[0] += 1
+    r, k = s.rings, s.rings.next
+    r.next = (k + 1) % r.q.shape[0]
+    r.count += 1
     _measure_root(s, k)
     _measure_joints(s, k)
     _measure_soles(s, k)
@@ -140,7 +146,7 @@ def _measure_root(s: Sensors, k: int):
     r, v, dt = s.rings, s.views, s.robot.timestep
     xmat = v.xmat[s.robot.root_body]
     remain = np.exp(-dt / DRIFT_TIME)
-    stir = s.noise[DRIFT] * np.sqrt(1.0 - remain * remain)
+    stir = s.tilt * np.sqrt(1.0 - remain * remain)
     for a in range(3):
         s.drift[a] *= remain
     add_noise(s.seed, stir, s.drift)
@@ -164,8 +170,8 @@ def _measure_root(s: Sensors, k: int):
                 accel = (v.qvel[c] - s.last_velocity[c]) / dt - s.gravity[c]
                 force += s.mount[d, b] * xmat[3 * c + d] * accel
         r.gyro[k, b], r.force[k, b] = rate, force
-    add_noise(s.seed, s.noise[GYRO], r.gyro[k])
-    add_noise(s.seed, s.noise[ACCELEROMETER], r.force[k])
+    add_noise(s.seed, s.gyro, r.gyro[k])
+    add_noise(s.seed, s.accelerometer, r.force[k])
     copy_into(v.qvel[:3], s.last_velocity)
 
 
@@ -173,15 +179,15 @@ def _measure_root(s: Sensors, k: int):
 def _measure_joints(s: Sensors, k: int):
     """Positions at the motor's side of the play, and velocities; the motors have them at once."""
     v, q, dq = s.views, s.bus.q, s.bus.dq
-    half = 0.5 * s.noise[BACKLASH]
+    half = 0.5 * s.backlash
     for j in range(q.shape[0]):
         now = v.qpos[7 + j]
         s.play[j] = min(max(s.play[j] - (now - s.last_q[j]), -half), half)
         s.last_q[j] = now
         q[j] = now + s.play[j] + s.encoder_bias[j]
         dq[j] = v.qvel[6 + j]
-    add_noise(s.seed, s.noise[ENCODER], q)
-    add_noise(s.seed, s.noise[VELOCITY], dq)
+    add_noise(s.seed, s.encoder, q)
+    add_noise(s.seed, s.velocity, dq)
     copy_into(q, s.rings.q[k])
     copy_into(dq, s.rings.dq[k])
 
@@ -197,8 +203,8 @@ def _measure_soles(s: Sensors, k: int):
         for b in range(3):
             w[a] += xmat[3 * b + a] * f[b]
     if f[2] > 0.0:
-        add_noise(s.seed, s.noise[FORCE] * weight, w[:3])
-        deviation = s.noise[COP] * f[2]
+        add_noise(s.seed, s.force * weight, w[:3])
+        deviation = s.cop * f[2]
         if deviation > 0.0:
             w[3] += deviation * normal(s.seed)
             w[4] += deviation * normal(s.seed)

@@ -9,38 +9,49 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.motor_bus import MotorBus
 
 from .drawn import DrawnRobot
 
 RING = 64  # physics steps that are remembered
-TORQUE, TARGET, STIFFNESS, DAMPING = range(4)  # rows of `Motors.asked`
-BLEND, NO_LOAD = range(2)  # entries of `Motors.numbers`
 
 
 @dataclass(frozen=True, eq=False)
+class MotorHistory(Block):
+    """What motors were asked for in the last `RING` physics steps, see `ask_servo`."""
+
+    torque: Annotated[np.ndarray, RING, "nu"]  # u [N·m]
+    target: Annotated[np.ndarray, RING, "nu"]  # q* [rad]
+    stiffness: Annotated[np.ndarray, RING, "nu"]  # K [N·m/rad]
+    damping: Annotated[np.ndarray, RING, "nu"]  # D [N·m·s/rad]
+
+
+@dataclass(eq=False)
 class Motors(Block):
     """The motors of an episode's robot (nu)."""
 
     robot: RobotArrays
     views: SimViews
     bus: MotorBus
-    asked: Annotated[np.ndarray, RING, 4, "nu"]  # asked for: torque, target, stiffness, damping
-    written: Annotated[np.ndarray, 1, np.int64]  # rows since the reset; the next one follows
-    late: Annotated[np.ndarray, 1, np.int64]  # physics steps
+    asked: MotorHistory
+    written: Mutable[int]  # rows since the reset; the next one follows
+    late: Mutable[int]  # physics steps
     torque: Annotated[np.ndarray, "nu"]  # that act [N·m]
     gain: Annotated[np.ndarray, "nu"]
-    numbers: Annotated[np.ndarray, 2]  # 1 − exp(−dt/lag); the no-load speed [rad/s], 0: none
+    blend: Mutable[float]  # 1 − exp(−dt/lag)
+    no_load: Mutable[float]  # speed [rad/s]; 0: none
 
 
 def begin_motors(m: Motors, drawn: DrawnRobot, holding: np.ndarray) -> None:
     """Start an episode, before which torques `holding` (nu,) [N·m] were asked for all the time."""
-    m.asked[:], m.torque[:], m.gain[:] = 0.0, drawn.gain * holding, drawn.gain
-    m.asked[:, TORQUE], m.bus.servoed[0] = holding, 0
-    m.written[0], m.late[0] = 0, drawn.command
-    m.numbers[BLEND] = -np.expm1(-m.robot.timestep / drawn.lag) if drawn.lag > 0.0 else 1.0
-    m.numbers[NO_LOAD] = drawn.no_load_speed
+    m.asked.clear()
+    m.torque[:], m.gain[:] = drawn.gain * holding, drawn.gain
+    m.asked.torque[:], m.bus.servoed = holding, 0
+    m.written, m.late = 0, drawn.command
+    m.blend = -np.expm1(-m.robot.timestep / drawn.lag) if drawn.lag > 0.0 else 1.0
+    m.no_load = drawn.no_load_speed
 
 
 @compiled
@@ -67,31 +78,31 @@ def drive_motors(m: Motors):
 
     `views.ctrl` stays the command: the difference is a generalised force.
     """
-    k, n = m.written[0], m.asked.shape[0]
-    m.written[0] += 1
-    remember(m, m.asked[k % n])
-    then = m.asked[(k - m.late[0]) % n]
+    k, a = m.written, m.asked
+    m.written += 1
+    remember(m, k % RING)
+    then = (k - m.late) % RING
     for i in range(m.torque.shape[0]):
         dof = m.robot.motor_dofs[i]
-        asked = then[TORQUE, i]
-        if then[STIFFNESS, i] != 0.0 or then[DAMPING, i] != 0.0:
-            asked += then[STIFFNESS, i] * (then[TARGET, i] - m.bus.q[dof - 6])
-            asked -= then[DAMPING, i] * m.bus.dq[dof - 6]
+        asked = a.torque[then, i]
+        if a.stiffness[then, i] != 0.0 or a.damping[then, i] != 0.0:
+            asked += a.stiffness[then, i] * (a.target[then, i] - m.bus.q[dof - 6])
+            asked -= a.damping[then, i] * m.bus.dq[dof - 6]
         most = m.robot.torque_limit[i]
         asked = m.gain[i] * min(max(asked, -most), most)
         torque = m.torque[i]
-        torque += m.numbers[BLEND] * (asked - torque)
-        limit = most * fraction_at(m.views.qvel[dof], torque, m.numbers[NO_LOAD])
+        torque += m.blend * (asked - torque)
+        limit = most * fraction_at(m.views.qvel[dof], torque, m.no_load)
         m.torque[i] = min(max(torque, -limit), limit)
         m.views.qfrc_applied[dof] = m.torque[i] - m.views.ctrl[i]
 
 
 @compiled
-def remember(m: Motors, row: np.ndarray):
-    """Write what the motors are asked for now into `row` (4, nu)."""
-    servoed, bus = m.bus.servoed[0], m.bus
-    for i in range(row.shape[1]):
-        row[TORQUE, i] = bus.torque[i] if servoed else m.views.ctrl[i]
-        row[TARGET, i] = bus.target[i] if servoed else 0.0
-        row[STIFFNESS, i] = bus.stiffness[i] if servoed else 0.0
-        row[DAMPING, i] = bus.damping[i] if servoed else 0.0
+def remember(m: Motors, row: int):
+    """Write what the motors are asked for now into a row of `asked`."""
+    servoed, bus, a = m.bus.servoed, m.bus, m.asked
+    for i in range(m.torque.shape[0]):
+        a.torque[row, i] = bus.torque[i] if servoed else m.views.ctrl[i]
+        a.target[row, i] = bus.target[i] if servoed else 0.0
+        a.stiffness[row, i] = bus.stiffness[i] if servoed else 0.0
+        a.damping[row, i] = bus.damping[i] if servoed else 0.0

@@ -10,12 +10,13 @@ from scipy.linalg import solve_discrete_are
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
 from .config import EstimatorConfig
 from .measurement import Rings
-from .prediction import Promises
+from .promises import Promises
 
 FROM_Q, FROM_DQ = 0, 1  # columns of `Odometry.gains`
 STIR, WANDER, SLIP, ROLL, JOINT_NOISE, RATE_GAIN = range(6)  # entries of `Odometry.numbers`
@@ -25,7 +26,7 @@ VV, VB, BB = range(3)  # entries of `Odometry.variance`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Odometry(Block):
     """What is remembered of a robot (nj joints, nc soles), as of the last measurement."""
 
@@ -33,7 +34,7 @@ class Odometry(Block):
     state: StateArrays  # the estimate of the tick before: its Jacobians are used here
     rings: Rings
     promises: Promises
-    seen: Annotated[np.ndarray, 1, np.int64]  # measurements that have been used
+    seen: Mutable[int]  # measurements that have been used
     position: Annotated[np.ndarray, 3]  # of the root [m]
     axes: Annotated[np.ndarray, 3, 3]  # of the root
     q: Annotated[np.ndarray, "nj"]  # [rad]
@@ -52,10 +53,10 @@ def begin_odometry(o: Odometry, noises: dict[str, float], c: EstimatorConfig) ->
     `noises` are the sensors' deviations by the names of `SensorErrors`.
     """
     r, dt, noise = o.rings, o.robot.timestep, o.numbers
-    o.promises.last[:], o.promises.rows[:], o.promises.written[0] = 0.0, 0.0, 0
-    o.seen[0] = 1
+    o.promises.clear()
+    o.seen = 1
     o.position[:] = r.truth_qpos[0, :3]
-    o.axes[:] = r.attitude[r.next[0] - 1]
+    o.axes[:] = r.attitude[r.next - 1]
     o.q[:], o.v[:] = r.q.mean(axis=0), 0.0
     o.v[3:6], o.v[6:] = r.gyro.mean(axis=0), r.dq.mean(axis=0)
     o.bias[:] = o.variance[:] = 0.0
@@ -102,11 +103,11 @@ def follow_measurements(o: Odometry, last: int, earlier: int):
     `earlier`: physics steps by which what acts was asked for before.
     """
     n = o.rings.q.shape[0]
-    for number in range(max(o.seen[0], last - n + 1), last):
-        row = (o.rings.next[0] - o.rings.count[0] + number + n) % n
+    for number in range(max(o.seen, last - n + 1), last):
+        row = (o.rings.next - o.rings.count + number + n) % n
         keep_joints(o, row, number - 1 - earlier)
         keep_velocity(o, row)
-    o.seen[0] = max(last, o.seen[0])
+    o.seen = max(last, o.seen)
 
 
 @compiled
@@ -114,7 +115,7 @@ def keep_joints(o: Odometry, row: int, asked: int):
     """Joint positions, velocities and the root's angular one: promised ones, then corrected."""
     r, p, dt = o.rings, o.promises, o.robot.timestep
     n = p.rows.shape[0]
-    promised = asked >= 0 and asked < p.written[0]
+    promised = asked >= 0 and asked < p.written
     for a in range(3):
         if promised:
             o.v[3 + a] += dt * p.rows[asked % n, 3 + a]

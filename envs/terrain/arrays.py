@@ -9,15 +9,15 @@ from poise.envs.compiled.memory import guarded_zeros
 
 from .terrain import Surface
 
-X_MIN, X_MAX, Y_MIN, Y_MAX, HEIGHT, GRADIENT = range(6)
+SURFACE = np.dtype([(name, float) for name in Surface._fields], align=True)
 NOWHERE = -1  # number of the floor among the surfaces
 
 
 def surface_arrays(surfaces: Sequence[Surface]) -> np.ndarray:
-    """(n, 6) one row for each surface, its entries in their order."""
-    rows = guarded_zeros((len(surfaces), len(Surface._fields)))
+    """(n,) surfaces as compiled code reads them, by the names of the fields of `Surface`."""
+    rows = guarded_zeros(len(surfaces), SURFACE)
     for i, surface in enumerate(surfaces):
-        rows[i] = surface
+        rows[i] = tuple(surface)
     return rows
 
 
@@ -27,7 +27,7 @@ def surface_height(surfaces: np.ndarray, i: int, floor: float, x: float) -> floa
     if i < 0:
         return floor
     s = surfaces[i]
-    return s[HEIGHT] + s[GRADIENT] * (x - 0.5 * (s[X_MIN] + s[X_MAX]))
+    return s.height + s.gradient * (x - 0.5 * (s.x_min + s.x_max))
 
 
 @compiled
@@ -36,7 +36,7 @@ def surface_below(surfaces: np.ndarray, x: float, y: float) -> int:
     found, highest = NOWHERE, -np.inf
     for i in range(surfaces.shape[0]):
         s = surfaces[i]
-        if x < s[X_MIN] or x > s[X_MAX] or y < s[Y_MIN] or y > s[Y_MAX]:
+        if x < s.x_min or x > s.x_max or y < s.y_min or y > s.y_max:
             continue
         z = surface_height(surfaces, i, 0.0, x)
         if z > highest:

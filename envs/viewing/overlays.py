@@ -20,7 +20,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from poise.envs.physics.pushes.table import BODY, DURATION, FORCE, KICK, KIND, NOTHING, POINT, START
+from poise.envs.physics.pushes.table import KICK, NOTHING
 from poise.envs.physics.simulation import Simulation
 
 from .quantities import CAPTURE_POINT, COM, COP, FOOTHOLD, PUSH, RGB, SUPPORT
@@ -74,16 +74,16 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
     size = simulation.robot.height_com
     views, found = simulation.views, []
     for row in simulation.push_table:
-        if row[KIND] == NOTHING:
+        if row["kind"] == NOTHING:
             continue
-        body, start, duration = int(row[BODY]), row[START], row[DURATION]
-        vector, is_kick = row[FORCE : FORCE + 3], row[KIND] == KICK
+        body, start, duration = row["body"], row["start"], row["duration"]
+        vector, is_kick = row["force"], row["kind"] == KICK
         age = simulation.time - start
         opacity = 1.0 - max(age - duration, 0.0) / FADE
         force = float(np.linalg.norm(vector))
         if age < -1e-9 or opacity <= 0.0 or force == 0.0:
             continue
-        tip = views.xipos[body] + views.xmat[body].reshape(3, 3) @ row[POINT : POINT + 3]
+        tip = views.xipos[body] + views.xmat[body].reshape(3, 3) @ row["point"]
         fraction = (simulation.robot.mass / KICK_TIME if is_kick else 1.0) * force / weight
         length = size * float(np.clip(ARROW_GAIN * fraction, *ARROW_LENGTHS))
         tail = tip - length * vector / force

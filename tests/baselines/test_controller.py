@@ -22,7 +22,7 @@ from poise.baselines import (
     load_controller,
 )
 from poise.baselines.controller import WrappedController, as_base_controller
-from poise.baselines.registry import KINDS
+from poise.baselines.registry import kind_classes
 from poise.configs.files import packaged
 from poise.envs import RobotState, Simulation, replicate
 from tests.support.shared import robot
@@ -94,9 +94,8 @@ def test_packaged_controllers_declare_what_is_asked(name: str) -> None:
     assert isinstance(controller, BaseController) and isinstance(controller, Controller)
     assert controller.unwrapped is controller and controller.failures == 0
     assert controller.root_wrench.shape == (6,) and not controller.root_wrench.any()
-    assert (
-        controller.robot is robot() and type(controller.config) is KINDS[controller.config.kind][0]
-    )
+    assert controller.robot is robot()
+    assert type(controller.config) is kind_classes(controller.config.kind)[0]
     other = controller.another()
     assert type(other) is type(controller) and other is not controller
     assert other.config == controller.config

@@ -177,5 +177,5 @@ def stand(path: Path) -> None:
     observation, _ = env.reset(seed=0)
     for _ in range(3):
         assert observation in env.observation_space, "an observation outside its space"
-        if env.episode.running[0]:
+        if env.episode.running:
             observation = env.step(np.zeros(len(env.action_names)))[0]

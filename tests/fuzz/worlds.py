@@ -50,5 +50,5 @@ def play_on(env: BalanceEnv, observation: np.ndarray, steps: int = 2) -> None:
     """A few policy steps from here; raises AssertionError for an observation that is none."""
     for _ in range(steps):
         assert observation in env.observation_space, "an observation outside its space"
-        if env.episode.running[0]:
+        if env.episode.running:
             observation = env.step(np.zeros(len(env.action_names)))[0]

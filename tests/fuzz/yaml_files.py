@@ -16,7 +16,7 @@ from poise.configs.schema import to_yaml
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
 from poise.envs.sensing.realism import load_realism
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.learning.config import train_config
@@ -33,7 +33,7 @@ def _suite(path: Path) -> None:
     grid = suite.grid
     if grid is None or grid.directions * len(grid.magnitudes) <= 100:
         if suite.envelope is None or suite.envelope.directions <= 100:
-            Plan(suite, load_limits(robot()), 0, ["zero"])
+            TrialPlan(suite, load_limits(robot()), 0, ["zero"])
 
 
 def _tuning(path: Path) -> None:

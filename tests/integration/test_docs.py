@@ -98,7 +98,9 @@ def parsed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(entry, "COMMANDS", recorders)
     clips = {name: recorder("motion", function) for name, function in motion.MOTION.items()}
     monkeypatch.setattr(motion, "MOTION", clips)
-    monkeypatch.setattr(train, "run", lambda args: (train.parse(args), called.append("train")))
+    monkeypatch.setattr(
+        train, "run_train", lambda args: (train.parse_train(args), called.append("train"))
+    )
     monkeypatch.setattr(entry, "check_flags", lambda *_: None)  # not all files of pages exist
     return called
 

@@ -57,15 +57,9 @@ PRIVATE = {
     r"\bthinks?\b|\bwants to\b": "code is not a person",
 }
 
-#: page → phrases, of these patterns, in which the word is meant or that code still writes
-MEANT = {
-    "baselines/motion/synthesis/synthesis.py": ('"played"',),  # a key of the record, read back
-    # a key of summary.json
-    "training/benchmarking/metrics/entry.py": ('"played"',),
-    "training/benchmarking/results/read.py": ('"played"', "'played'"),
-    "training/running/summary.py": ("`played`", "played: Required"),
-    # a key of the record of a script, written by baselines/motion/synthesis
-    "training/pictures/motion_report/timeline.py": ('record["played"]', 'field="played"'),
+#: page → phrases, of these patterns, in which the word is meant or an older name is read
+MEANT: dict[str, tuple[str, ...]] = {
+    "training/benchmarking/results/summary.py": ('"played"',),
 }
 
 #: names that stand for a file of the reader

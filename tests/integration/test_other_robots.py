@@ -106,15 +106,18 @@ def test_gains_for_the_t1(direction, specific):
 def test_gains_scale_with_mass_and_height():
     """One configuration becomes other numbers: forces by m g, moments by m g h, rates by √(g/h)."""
     humanoid, tall = (ResidualBalanceEnv(robot_named(n), pushes=None) for n in ("humanoid", "tall"))
-    a, b = humanoid.controller.parameters, tall.controller.parameters
+    both = humanoid.controller, tall.controller
+    a, b = ({name: task.block for name, task in each.tasks.items()} for each in both)
     m = tall.robot.mass / humanoid.robot.mass
     h = tall.robot.height_com / humanoid.robot.height_com
-    np.testing.assert_allclose(b.com_weight, a.com_weight / m**2)
-    np.testing.assert_allclose(b.angular_weight, a.angular_weight / (m * h) ** 2)
-    np.testing.assert_allclose(b.com_stiffness, a.com_stiffness / h)
-    np.testing.assert_allclose(b.com_damping, a.com_damping / np.sqrt(h))
-    np.testing.assert_allclose(b.stiffness[3:6], a.stiffness[3:6] / h)
-    np.testing.assert_allclose(b.accel_weight[3:6], a.accel_weight[3:6] * h**2)
-    assert b.force_weight == pytest.approx(a.force_weight / m**2)
-    assert b.moment_weight == pytest.approx(a.moment_weight / (m * h) ** 2)
-    assert b.sole_damping == pytest.approx(a.sole_damping / np.sqrt(h))
+    np.testing.assert_allclose(b["com"].weight, a["com"].weight / m**2)
+    np.testing.assert_allclose(b["cop"].weight, a["cop"].weight / (m * h) ** 2)
+    np.testing.assert_allclose(b["com"].stiffness, a["com"].stiffness / h)
+    np.testing.assert_allclose(b["com"].damping, a["com"].damping / np.sqrt(h))
+    np.testing.assert_allclose(b["posture"].stiffness[3:6], a["posture"].stiffness[3:6] / h)
+    np.testing.assert_allclose(b["posture"].weight[3:6], a["posture"].weight[3:6] * h**2)
+    wrenches = a["wrenches"], b["wrenches"]
+    assert wrenches[1].force_weight == pytest.approx(wrenches[0].force_weight / m**2)
+    assert wrenches[1].moment_weight == pytest.approx(wrenches[0].moment_weight / (m * h) ** 2)
+    damping = [each.parameters.sole_damping for each in both]
+    assert damping[1] == pytest.approx(damping[0] / np.sqrt(h))

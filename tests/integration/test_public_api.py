@@ -19,6 +19,7 @@ LAZY = {
     "poise": "src/poise",
     "poise.envs": "envs",
     "poise.baselines": "baselines",
+    "poise.baselines.motion": "baselines/motion",
     "poise.baselines.whole_body": "baselines/whole_body",
     "poise.training": "training",
 }

@@ -22,13 +22,13 @@ DOORS = 7  # folders in a folder
 # A room imports rooms of lower floors only; those of one floor do not know each other. A file that
 # is not in a room is one by itself.
 FLOORS = """
- 1 baselines/balance, baselines/motion, configs, training/benchmarking
+ 1 baselines/balance, configs, training/benchmarking
  1 training/benchmarking/statistics, training/deploy, training/pictures
- 2 baselines/allowance, baselines/motion/synthesis/scripts, envs/compiled, envs/robots/models
- 2 training/running/options
+ 2 baselines/allowance, baselines/extras, baselines/motion/synthesis/scripts, envs/compiled
+ 2 envs/robots/models
  3 baselines/policy_files/onnx, baselines/solvers, baselines/warmup, envs/compiled/maths
  3 envs/terrain, training/running
- 4 baselines/motion/clips, envs/robots
+ 4 baselines/motion/clips, envs/robots, training/running/options
  5 baselines/motion/graphs/joining, envs/physics/engines, envs/physics/pushes
  6 baselines/motion/graphs, baselines/motion/graphs/matching
  6 baselines/motion/retargeting/inverse_kinematics, envs/physics
@@ -45,12 +45,13 @@ FLOORS = """
 13 baselines/walking
 14 baselines/registry
 15 baselines/environments
-16 baselines, baselines/environments/guard, training/benchmarking/diagnosis
+16 baselines, baselines/environments/guard, baselines/motion, training/benchmarking/diagnosis
 16 training/deploy/policy_check, training/learning, training/motion/tracking
 17 training/benchmarking/trials, training/learning/seeds, training/motion
 18 training/benchmarking/suites, training/deploy/robot_check/standing, training/deploy/standalone
 18 training/learning/tuning, training/motion/following, training/pictures/figures
-19 training/benchmarking/metrics, training/deploy/qp_set, training/deploy/robot_check
+19 training/benchmarking/metrics, training/deploy/lowcmd, training/deploy/qp_set
+19 training/deploy/robot_check
 20 training/benchmarking/evaluation
 21 training/benchmarking/results, training/motion/gaits
 22 training/deploy/export, training/pictures/report, training/pictures/sessions

@@ -7,7 +7,6 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config
-from poise.envs.balance.episode import ROOT_FORCE
 from tests.support.physics import controller, recovery, robot_named
 
 
@@ -21,10 +20,11 @@ def test_a_heavy_soft_root_is_a_hard_root():
     hard = [tick for tick in recovery() if tick.solved][10::12]
     robot = robot_named("humanoid")
     soft = controller(robot, root="soft")
-    light = soft.parameters
+    root = soft.tasks["root"].block
+    light = root.weight.copy()
     errors, leaning = [], []
     for weight in (1e2, 1e4, 1e6, 1e8):
-        soft.parameters = replace(light, root_weight=weight * light.root_weight / 1e3)
+        root.weight[:] = weight * light / 1e3
         differences, wrenches = [], []
         for tick in hard:
             soft.reset()
@@ -58,7 +58,7 @@ def test_a_soft_root_never_falls(robot, direction):
             if env.fallen:
                 break
         fell[root] = env.fallen
-        leaned = env.episode.metrics[ROOT_FORCE]
+        leaned = env.episode.metrics.root_force
         assert (leaned > 50.0) == (root == "soft")  # [N]
         assert np.abs(env.controller.root_wrench).max() > 0.0 or root == "hard"
     assert fell == {"soft": False, "hard": True}

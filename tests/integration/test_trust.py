@@ -35,7 +35,7 @@ from poise.training.benchmarking.results.leaderboard import write_leaderboard
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import film, replay
 from poise.training.benchmarking.trials.agents import load_agent
-from poise.training.benchmarking.trials.jobs import Job, Stage, play
+from poise.training.benchmarking.trials.jobs import Job, TrialStage, run_job
 from poise.training.cli.entry import main
 from poise.training.deploy.export.export import export_policy
 from poise.training.deploy.qp_set.export import write_qp_set
@@ -46,7 +46,7 @@ from poise.training.learning.policy_files import check_controller, controller_fi
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
 from poise.training.learning.tuning.candidates import Candidate
-from poise.training.learning.tuning.candidates import play as play_candidate
+from poise.training.learning.tuning.candidates import worth_of_trials as play_candidate
 from poise.training.learning.tuning.gains import Gains
 from poise.training.learning.tuning.search import tune, tune_config
 from poise.training.learning.tuning.tasks import TuneConfig
@@ -165,7 +165,7 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "benchmark, what its folder holds": lambda g, n: benchmark(
         ["zero"], g.suite(), out=finished(g, n)
     ),
-    "a job": lambda g, n: play(Job(Stage("humanoid", 1.0, None), n, None)),
+    "a job": lambda g, n: run_job(Job(TrialStage("humanoid", 1.0, None), n, None)),
     "tune": lambda g, n: tune(tune_config(_tuning(g, n)), g.here / "out"),
     "tune, a policy's folder": lambda g, n: tune(
         TuneConfig("momentum-qp", {"com.weight": (0.1, 1.0)}, policy=str(policy(g, n))),

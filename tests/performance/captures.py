@@ -2,6 +2,7 @@
 
     python -m tests.performance.captures                       # 15 captures, 20 starts each
     python -m tests.performance.captures walk cmu02_jump --starts 5
+    python -m tests.performance.captures mine.bvh yours.bvh      # files
 
 Five of others, found by name as `poise motion import` finds them (POISE_CLIPS, see
 docs/motions.md), and the ten that `tests.support.captures` makes. Each is imported as that command
@@ -9,6 +10,8 @@ does it, and followed as `poise motion follow --seed 21` by what the import name
 walks it (`walk`, `walk-fast` or `residual-walk-fast`), else by `motion-step`. Its speed is its way
 times its tempo, as shares of the clip's; where it walks, `reached` is that times the way that it
 went over the clip's, mean. `caught` is how often the planner of steps took over in a trial, mean.
+`steps` are those that the clip's foot took within 0.1 s, after the `delay` of a walk; `joints` the
+RMS error [°], of a walk of trunk and arms. Both are means over trials.
 Bar: 80 % at 0.7 of their speed without a fall.
 """
 
@@ -45,6 +48,9 @@ class Row(NamedTuple):
     falls: int
     caught: float
     refused: str
+    steps: float = np.nan
+    delay: float = np.nan
+    joints: float = np.nan
 
     @property
     def speed(self) -> float:
@@ -82,13 +88,18 @@ def judge(path: Path, starts: int, seed: int, folder: Path) -> Row:
     walked = np.array([trial.walked for trial in trials])  # NaN: falls before the clip begins
     went = 1.0 if np.isnan(walked).all() else made.asked * float(np.nan_to_num(walked).mean())
     falls = sum(trial.fallen for trial in trials)
-    return row._replace(falls=falls, caught=caught, went=went)
+    steps, delay, joints = (
+        float(np.mean([getattr(trial, name) for trial in trials]))
+        for name in ("footsteps_kept", "footstep_delay", "joint_rms")
+    )
+    return row._replace(falls=falls, caught=caught, went=went, steps=steps, delay=delay,
+                        joints=np.degrees(joints))  # fmt: skip
 
 
 def main() -> None:
     """A line for each capture as it is done, and how many meet the bar."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("names", nargs="*", help="of captures; all")
+    parser.add_argument("names", nargs="*", help="of captures, or .bvh files; all")
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--seed", type=int, default=21)
     given = parser.parse_args()
@@ -99,18 +110,20 @@ def main() -> None:
         known = captured_clips()
         paths = [known[name] for name in OTHERS if name in known]
         paths += [folder / f"{name}.bvh" for name in CAPTURES]
-        chosen = [path for path in paths if not given.names or path.stem in given.names]
-        print("| capture | as | way | tempo | in the air | speed | reached | falls | caught | |\n"
-              + "|---" * 10 + "|")  # fmt: skip
+        files = [Path(name) for name in given.names if name.endswith(".bvh")]
+        named = [path for path in paths if path.stem in given.names]
+        print("| capture | as | way | tempo | in the air | speed | reached | falls | caught "
+              "| steps | delay | joints | |\n" + "|---" * 13 + "|")  # fmt: skip
         rows = []
-        for path in chosen:
+        for path in [*named, *files] if given.names else paths:
             row = judge(path, given.starts, given.seed, folder)
             rows.append(row)
             shares = (row.way, row.tempo, row.flight, row.speed, row.reached)
             figures = " | ".join(f"{share:.2f}" for share in shares)
-            figures += f" | {row.falls} of {given.starts} | {row.caught:.1f}"
+            figures += f" | {row.falls} of {given.starts} | {row.caught:.1f} | {row.steps:.0%}"
+            figures += f" | {row.delay:.2f} | {row.joints:.1f}"
             end = row.refused or ("met" if row.met else "missed")
-            print(f"| {row.name} | {row.how} | " + (" | " * 6 if row.refused else figures)
+            print(f"| {row.name} | {row.how} | " + (" | " * 9 if row.refused else figures)
                   + f" | {end} |", flush=True)  # fmt: skip
     met = [row for row in rows if row.met]
     fast = sum(row.reached >= SPEED - 5e-3 for row in met)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.baselines import IkGoal, IkOptions, IkResult, InverseKinematics, PosePrior
+from poise.baselines.motion import IkGoal, IkOptions, IkResult, InverseKinematics, PosePrior
 from poise.baselines.motion.retargeting.inverse_kinematics.solve import METHODS
 from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.envs import Robot, load_robot

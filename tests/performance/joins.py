@@ -36,8 +36,9 @@ from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.trials.jobs import ANYWHERE
 from poise.training.motion.following.follow import performer
-from poise.training.motion.tracking.record import ANYWHERE, Footing, lies
+from poise.training.motion.tracking.record import FeetRecord, lies
 from poise.training.motion.tracking.reference import ReferenceBodies
 
 CLIPS = tuple(
@@ -88,7 +89,7 @@ def perform(robot: Robot, clip: RobotClip, start: float, end: float, seed: int) 
     agent = performer(CONTROLLER, robot, motion, duration, ANYWHERE)
     env, bodies = agent.env, ReferenceBodies(motion, robot)
     observation, _ = env.reset(seed=seed, options={"push": []})
-    footing, errors, done = Footing(env.simulation.state), [], False
+    footing, errors, done = FeetRecord(env.simulation.state), [], False
     while not done:
         _, terminated, truncated = env.step_without_info(agent.act(observation))
         footing.update(env.simulation.state)

@@ -13,7 +13,7 @@ import numpy as np
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips
 from poise.baselines.motion.graphs.matching.database import MatchingDatabase
-from poise.baselines.motion.graphs.matching.player import Command
+from poise.baselines.motion.graphs.matching.player import PlayerCommand
 
 QUERIES = 2_000
 
@@ -31,7 +31,9 @@ def main() -> None:
     frames.nearest(points[0])
     for _ in range(QUERIES):
         at = frames.match_at(int(rng.integers(len(frames.values))), 0.0)
-        command = Command(rng.uniform(-0.5, 1.5), rng.uniform(-0.3, 0.3), rng.uniform(-1.0, 1.0))
+        command = PlayerCommand(
+            rng.uniform(-0.5, 1.5), rng.uniform(-0.3, 0.3), rng.uniform(-1.0, 1.0)
+        )
         query = frames.query(at.clip, at.frame, command.future(frames.ahead))
         begin = time.thread_time()
         found = frames.nearest(query)

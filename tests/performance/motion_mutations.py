@@ -26,7 +26,7 @@ from poise.baselines.motion.graphs.motion_graph import (
     read_graph,
     write_graph,
 )
-from poise.baselines.motion.graphs.paths import Task
+from poise.baselines.motion.graphs.paths import PathTask
 from poise.baselines.motion.graphs.search import best_paths
 from poise.baselines.motion.synthesis.scripts.parser import parse
 from poise.baselines.motion.synthesis.synthesis import Synthesis
@@ -73,7 +73,7 @@ def play_graph(seed: int) -> None:
         text = damaged_graph(path.read_text(), np.random.default_rng(seed))
         path.write_text(text, errors="replace")
         made = read_graph(path)
-        best_paths(made, Task(made.names[-2:]), 2)
+        best_paths(made, PathTask(made.names[-2:]), 2)
         Synthesis(made, clips()).make(parse(f'"{made.names[0]}" -> "{made.names[-1]}"'))
 
 

@@ -16,7 +16,7 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips
 from poise.baselines.motion.graphs.adjacency import make_graph
 from poise.baselines.motion.graphs.motion_graph import GraphClip
-from poise.baselines.motion.graphs.paths import Task
+from poise.baselines.motion.graphs.paths import PathTask
 from poise.baselines.motion.graphs.search import best_paths
 from poise.configs.errors import ConfigError
 from tests.support.motion_graphs import check_search, random_graph
@@ -29,7 +29,7 @@ def plan_times(share: float, k: int, seed: int = 0) -> tuple[int, list[float]]:
     """Transitions of a graph of 50 clips, and processor times [s] of plans of 20 actions."""
     rng = np.random.default_rng(seed)
     graph = random_graph(rng, CLIPS, 2, share)
-    task, times = Task(tuple(str(name) for name in rng.choice(graph.names, ACTIONS))), []
+    task, times = PathTask(tuple(str(name) for name in rng.choice(graph.names, ACTIONS))), []
     for _ in range(REPEATS):
         begin = time.process_time()
         best_paths(graph, task, k)

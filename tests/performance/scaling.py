@@ -73,10 +73,10 @@ class Rig:
         tick = c.tick(self.state, self.targets)
         spent = _timed(lambda: momentum_tick(tick))
         torques = ws.tau[c.arrays.motor_dofs - 6].copy()
-        ws.status[0] = 1
+        ws.status = 1
         call = _timed(lambda: accept(self.s, c.parameters, ws, c.memory))
-        c.memory.failures[0] -= 1
-        c.memory.streak[0] -= 1
+        c.memory.failures -= 1
+        c.memory.streak -= 1
         self.times["tick"].append(spent - call)
         self.times["state"].append(_timed(self.update))
         self.times["active"].append(float(ws.iscratch[1]))

@@ -45,6 +45,7 @@ class TsidTick:
 
     def __init__(self, robot: Robot, controller: MomentumQP):
         p = controller.parameters
+        posture, com, cop = (controller.tasks[name].block for name in ("posture", "com", "cop"))
         self.robot = robot
         self._kept: list[object] = []  # TSID holds references to samples without owning them
         with tempfile.TemporaryDirectory() as folder:
@@ -61,20 +62,20 @@ class TsidTick:
 
         self.contacts = [self._add_contact(sole, p.sole_damping) for sole in robot.soles]
         gains = np.zeros((2, len(ids)))
-        gains[:, self._v - 6] = p.stiffness[6:], p.damping[6:]
+        gains[:, self._v - 6] = posture.stiffness[6:], posture.damping[6:]
         mass = robot.mass
         self.com = tsid.TaskComEquality("com", self.wrapper)
-        self.com.setKp(p.com_stiffness)
-        self.com.setKd(p.com_damping)
-        self.formulation.addMotionTask(self.com, float(p.com_weight[0] * mass**2), 1, 0.0)
+        self.com.setKp(com.stiffness)
+        self.com.setKd(com.damping)
+        self.formulation.addMotionTask(self.com, float(com.weight[0] * mass**2), 1, 0.0)
         self.posture = tsid.TaskJointPosture("posture", self.wrapper)
         self.posture.setKp(gains[0])
         self.posture.setKd(gains[1])
-        self.formulation.addMotionTask(self.posture, float(p.accel_weight[6:].mean()), 1, 0.0)
+        self.formulation.addMotionTask(self.posture, float(posture.weight[6:].mean()), 1, 0.0)
         self.momentum = tsid.TaskAMEquality("momentum", self.wrapper)
         self.momentum.setKp(np.full(3, 10.0))
         self.momentum.setKd(np.zeros(3))
-        self.formulation.addMotionTask(self.momentum, float(p.angular_weight[0]), 1, 0.0)
+        self.formulation.addMotionTask(self.momentum, float(cop.weight[0]), 1, 0.0)
         self._hold(self.momentum, tsid.TrajectoryEuclidianConstant("L", np.zeros(3)))
         self._hold(self.posture, tsid.TrajectoryEuclidianConstant("q", standing[0][7:]))
         limit = np.zeros(len(ids))

@@ -21,7 +21,7 @@ NAMES = ("momentum-qp", "walk", "walk-double")
 def kind_of(controller) -> str:
     """What a tick was for, once it walks."""
     swinging = getattr(getattr(controller, "memory", None), "swinging", None)
-    return "" if swinging is None else ", in a swing" if swinging[0] else ", on both feet"
+    return "" if swinging is None else ", in a swing" if swinging else ", on both feet"
 
 
 def play(env, name) -> list[float]:

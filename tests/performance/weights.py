@@ -17,7 +17,6 @@ import yaml
 
 from poise.baselines.registry import momentum_qp_config
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import ROOT_FORCE
 from poise.training.motion.following.follow import follow
 from poise.training.pictures.figures.style import legend_below, look, saved_figure
 
@@ -51,7 +50,7 @@ def play(file: Path) -> dict[str, float]:
     forces = [0.0]
 
     def watch(env: BalanceEnv) -> None:
-        forces[0] = max(forces[0], float(env.episode.metrics[ROOT_FORCE]))
+        forces[0] = max(forces[0], float(env.episode.metrics.root_force))
 
     trials = follow(MOTION, str(file), starts=STARTS, share=SHARE, directions=STARTS, seed=SEED,
                     watch=lambda _: watch)  # fmt: skip

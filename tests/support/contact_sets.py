@@ -32,6 +32,6 @@ def _limited(sets, state, targets, soles, tasks, load_limits):
     """What a tick works on, with largest vertical forces (len(soles),) of the soles [N]."""
     block = sets.bind(soles, state.arrays, targets.arrays(), tasks)
     if load_limits is not None:
-        block.limited[0] = 1
+        block.limited = 1
         block.load_limits[:] = load_limits
     return block

@@ -42,7 +42,7 @@ def _drive(env: Any, steps: int, seed: int) -> list[Any]:
     """Random actions, as long as the episode goes on; what `step` says."""
     rng, seen, bare = np.random.default_rng(seed), [], env.unwrapped
     for _ in range(steps):
-        if not bare.episode.running[0]:
+        if not bare.episode.running:
             break
         action = 0.3 * rng.uniform(-1.0, 1.0, env.action_space.shape)
         seen += list(env.step(action.astype(np.float32)))

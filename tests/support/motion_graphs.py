@@ -15,7 +15,7 @@ from poise.baselines.motion.graphs.motion_graph import (
     earliest_part,
     latest_part,
 )
-from poise.baselines.motion.graphs.paths import Task
+from poise.baselines.motion.graphs.paths import PathTask
 from poise.baselines.motion.graphs.search import best_paths
 from poise.configs.errors import ConfigError
 
@@ -39,7 +39,7 @@ def random_graph(rng: np.random.Generator, clips: int, each: int, share: float) 
     return MotionGraph("", limits, tuple(entries), {}, weights, tuple(transitions))
 
 
-def random_task(rng: np.random.Generator, graph: MotionGraph, actions: int) -> Task:
+def random_task(rng: np.random.Generator, graph: MotionGraph, actions: int) -> PathTask:
     """Wanted clips; sometimes an arrow by hand, and places to begin and end at."""
     names = tuple(str(name) for name in rng.choice(graph.names, actions))
     lengths = {clip.name: clip.duration for clip in graph.clips}
@@ -50,10 +50,10 @@ def random_task(rng: np.random.Generator, graph: MotionGraph, actions: int) -> T
         if rng.random() < 0.3:
             for name in rng.choice(graph.names, 2, replace=False):
                 places[str(name), float(rng.uniform(0.0, lengths[name]))] = float(rng.random())
-    return Task(names, arrows, start, goal)
+    return PathTask(names, arrows, start, goal)
 
 
-def brute_force(graph: MotionGraph, task: Task, k: int) -> list[float]:
+def brute_force(graph: MotionGraph, task: PathTask, k: int) -> list[float]:
     """Costs of the k cheapest paths that meet no moment twice: every path is walked.
 
     A path is not followed further where what it costs, with the least that is left to pay, is more

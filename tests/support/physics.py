@@ -14,6 +14,8 @@ from poise.baselines.controller import Targets
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.baselines.whole_body.parameters import QPParameters
+from poise.baselines.whole_body.parts.part import Bound
+from poise.baselines.whole_body.tasks.task import Task
 from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
@@ -90,6 +92,7 @@ class Tick(NamedTuple):
     state: RobotState
     targets: Targets
     parameters: QPParameters
+    tasks: list[Bound[Task]]
     cop_vel: np.ndarray  # what the controller measured
     torques: np.ndarray  # (nu,) its answer
     vdot: np.ndarray
@@ -120,7 +123,7 @@ def recovery(
     robot = robot_named(name)
     qp = controller(robot, root=root)
     simulation = Simulation(robot)
-    simulation.state_arrays.friction[0] = friction
+    simulation.state_arrays.friction = friction
     ticks, force = [], ExternalForce.allocate()
     force.load[:] = load
     for direction in (0.0, 90.0, 180.0, 250.0):
@@ -135,8 +138,9 @@ def recovery(
             if k % every == 3:
                 ticks.append(
                     Tick(
-                        state.copy(), targets, qp.parameters, qp.workspace.cop_vel.copy(), torques,
-                        qp.vdot, qp.wrenches, qp.root_wrench, qp.failures == failures,
+                        state.copy(), targets, qp.parameters, list(qp.tasks.values()),
+                        qp.workspace.cop_vel.copy(), torques, qp.vdot,
+                        qp.wrenches, qp.root_wrench, qp.failures == failures,
                     )
                 )  # fmt: skip
             state = simulation.step(torques, 2)

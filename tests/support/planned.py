@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
-from poise.baselines.balance.stepping.controller import StepOffsets
+from poise.baselines.balance.references.targets import no_offsets
 from poise.baselines.balance.stepping.planning.blocks import Search
 from poise.baselines.balance.stepping.planning.config import (
     PivotConfig,
@@ -34,7 +34,7 @@ class Planner:
 
     def __init__(self, robot, limits, choice, feedback=None, falls=None, **rule):
         self.robot, self.limits, self.choice, self.units = robot, limits, choice, robot.units
-        self.region, self.offsets = cop_region(robot), StepOffsets()
+        self.region, self.offsets = cop_region(robot), no_offsets()
         self.foot_sign = foot_signs(robot)
         self.feedback = feedback_arrays(
             robot, feedback or StepFeedback(), falls or {}, PivotConfig()
@@ -53,7 +53,7 @@ class Planner:
         """The search for steps from a state."""
         return make_search(
             self.robot, state.arrays, self.region, self.limits, self.choice, self.feedback,
-            self.offsets.values, **self.further,
+            self.offsets, **self.further,
         )  # fmt: skip
 
 
@@ -91,9 +91,9 @@ def footholds(
     search.start[:] = start
     found, costs = np.empty((len(times), 2)), np.empty(len(times))
     for k, time in enumerate(times):
-        search.time[0] = time
+        search.time = time
         planner.foothold_rule(search)
-        found[k], costs[k] = search.foothold, search.cost[0]
+        found[k], costs[k] = search.foothold, search.cost
     return found, costs
 
 
@@ -116,7 +116,7 @@ def beyond(
 
 def aim(swing: Swing, foothold: np.ndarray, duration: float | None = None) -> None:
     """Lead to another `foothold` (2,), or at another time, see `aim_swing`."""
-    duration = swing.duration[0] if duration is None else duration
+    duration = swing.duration if duration is None else duration
     aim_swing(swing, float(foothold[0]), float(foothold[1]), float(duration))
 
 
@@ -133,5 +133,6 @@ def _along(planner: Planner, state: RobotState, yaw: float) -> Search:
 
 
 def _best(search: Search) -> StepPlan:
-    x, y, time, cost, offset = search.best.tolist()
-    return StepPlan(int(search.best_foot[0]), np.array([x, y]), time, cost, offset)
+    x, y, time = search.best_x, search.best_y, search.best_time
+    cost, offset = search.best_cost, search.best_offset
+    return StepPlan(int(search.best_foot), np.array([x, y]), time, cost, offset)

@@ -12,9 +12,9 @@ from poise.baselines.motion.synthesis.scripts.tree import (
     Modifier,
     Overlay,
     Script,
+    ScriptTerm,
     Sequence,
     StateName,
-    Term,
 )
 
 #: the example of Semakin's dissertation, (18)
@@ -47,18 +47,19 @@ def random_arrow(rng: np.random.Generator) -> Arrow:
     return Arrow(str(rng.choice(KINDS)), options)
 
 
-def random_term(rng: np.random.Generator, depth: int) -> Term:
+def random_term(rng: np.random.Generator, depth: int) -> ScriptTerm:
     kind = rng.random()
     body: ClipName | StateName | Sequence
     if kind < 0.3 and depth:
         body = random_sequence(rng, depth - 1)
     elif kind < 0.4:
-        body = StateName(str(rng.choice(NAMES)))
+        time = round(float(rng.uniform(0.0, 5.0)), 3) if rng.random() < 0.5 else None
+        body = StateName(str(rng.choice([*NAMES, "a b"])), time)
     elif kind < 0.7:
         body = ClipName(str(rng.choice([*NAMES, "достать оружие", "a|b -> #"])), quoted=True)
     else:
         body = ClipName(str(rng.choice(NAMES)))
-    return Term(body, tuple(random_modifier(rng) for _ in range(int(rng.integers(0, 3)))))
+    return ScriptTerm(body, tuple(random_modifier(rng) for _ in range(int(rng.integers(0, 3)))))
 
 
 def random_modifier(rng: np.random.Generator) -> Modifier:

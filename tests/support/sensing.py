@@ -53,5 +53,5 @@ def remeasured(source: EstimatedState, name: str, count: int) -> np.ndarray:
     rings, rows = source.sensors.rings, []
     for _ in range(count):
         run(source.sense)
-        rows.append(getattr(rings, name)[rings.next[0] - 1].copy())
+        rows.append(getattr(rings, name)[rings.next - 1].copy())
     return np.array(rows)

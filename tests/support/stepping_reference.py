@@ -7,7 +7,6 @@ from poise.baselines.balance.stepping.planning.cop_region import (
     LOAD_FRACTIONS,
     rest_ahead,
 )
-from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import LOADING, SHIFTING
 from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.envs.compiled.maths.polygons import nearest_inside
@@ -41,15 +40,15 @@ def quintic(start, end, duration, t):
 def advanced(swing, dt):
     """(3, 3) what `planned.advance` should give."""
     rest, speed, w = time_left(swing), swing.landing_speed, swing
-    reference, ground = swing.reference.T, float(w.ground[0])
+    reference, ground = swing.reference.T, float(w.ground)
     ways = []
     for now, place in zip(reference[:2], swing.foothold, strict=True):
         end = np.array([place, 0.0, 0.0])
         ways.append(quintic(now, end, rest, dt) if rest > dt else end)
-    lift = w.lift * swing.duration[0]
-    if swing.time[0] + dt < lift:
+    lift = w.lift * swing.duration
+    if swing.time + dt < lift:
         apex = [ground + w.apex, 0.0, 0.0]
-        ways.append(quintic(reference[2], apex, lift - swing.time[0], dt))
+        ways.append(quintic(reference[2], apex, lift - swing.time, dt))
     elif rest > dt:
         ways.append(quintic(reference[2], [ground, -speed, 0.0], rest, dt))
     else:
@@ -102,7 +101,7 @@ class ReadablePlanner:
         """Take the gains of where the body falls: each linear in the angle from the heading."""
         f, (ahead, left) = self.planner.feedback, turn(yaw).T @ state.com_vel[:2]
         self.gains = f.always.copy()
-        if f.signals[LATER_STEP] == 0.0 and len(f.angles):
+        if f.signals.later_step == 0.0 and len(f.angles):
             angle = np.arctan2(abs(left), ahead)
             for i, k in np.ndindex(f.always.shape):
                 self.gains[i, k] += np.interp(angle, f.angles, f.added_at[:, i, k])
@@ -117,7 +116,7 @@ class ReadablePlanner:
         lean = R.T @ (state.root_axes @ standing.T @ [0.0, 0.0, 1.0])[:2]
         L = state.arrays.momentum[3:5]
         spin = R.T @ [L[1], -L[0]] * self.omega / (robot.mass * robot.gravity * self.h)
-        signals = [1.0, f.signals[LATER_STEP], self.phase, *out * capture, *out * lean, *out * spin]
+        signals = [1.0, f.signals.later_step, self.phase, *out * capture, *out * lean, *out * spin]
         return self.gains @ signals
 
     def plan(self, state, yaw):
@@ -134,10 +133,10 @@ class ReadablePlanner:
     def replan(self, state, foot, yaw, swing):
         """The best time and place of a running step."""
         rate = self.omega
-        self.phase = swing.time[0] / swing.duration[0]
-        low = max(self.limits.time_min / rate - swing.time[0], FROZEN)
-        high = max(self.limits.time_max / rate - swing.time[0], low)
-        left = max(time_left(swing) - swing.time_offset[0], FROZEN)
+        self.phase = swing.time / swing.duration
+        low = max(self.limits.time_min / rate - swing.time, FROZEN)
+        high = max(self.limits.time_max / rate - swing.time, low)
+        left = max(time_left(swing) - swing.time_offset, FROZEN)
         times = np.append(np.linspace(low, high, 8), left)
         start = swing.reference[0, :2] + 0.5 * swing.reference[1, :2] * min(left, 0.1)
         best = self.best(state, foot, yaw, times, start, 0.02 * np.abs(times - left))
@@ -208,10 +207,10 @@ def guided(controller, state, targets, region, overreach, ground, stride, raised
     rest = region.mean(axis=0)
     if controller.swing is None:
         rest = rest + R @ [rest_ahead(controller.robot, controller.region), 0.0]
-    if r.stage[0] == SHIFTING:
+    if r.stage == SHIFTING:
         rest = r.capture_target
     wanted = xi + c.gain * (xi - rest - R @ offsets.com)
-    if r.stage[0] == LOADING:
+    if r.stage == LOADING:
         away = wanted - xi
         wanted = xi + away * min(
             1.0, c.recentring.cop_distance * h / max(float(np.linalg.norm(away)), 1e-9)

@@ -18,12 +18,12 @@ from poise.configs.schema import to_dict, to_yaml
 from poise.envs.balance.config import StartNoise
 from poise.training.benchmarking.evaluation.folder import Settings
 from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
-from poise.training.benchmarking.trials.jobs import Stage
+from poise.training.benchmarking.trials.jobs import TrialStage
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.table import COLUMNS, trial_row
-from poise.training.benchmarking.trials.trial import failed
+from poise.training.benchmarking.trials.trial import failed_trial
 from poise.training.running.files import csv_text, plain
 from poise.training.running.provenance import circumstances, versions
 from poise.training.running.summary import FORMAT, Summary
@@ -105,8 +105,8 @@ class Ground:
             FORMAT, suite_name, to_dict(suite), "humanoid", robot().fingerprint, 0, None,
             versions(("mujoco", "numpy", "numba")), {controller: "0"},
         )  # fmt: skip
-        plan = Plan(suite, limits, 0, [controller])
-        played = [(plan.first[0], failed(ValueError()))]
+        plan = TrialPlan(suite, limits, 0, [controller])
+        played = [(plan.first[0], failed_trial(ValueError()))]
         summary: Summary = {
             "format": FORMAT, "suite": suite_name, "seed": 0, "robot": robot_figures(limits),
             "rated": None, "scale": limits.scale, "reference": controller,
@@ -136,7 +136,7 @@ def allowed_there(name: str) -> bool:
 
 def loaded_there(name: str) -> str:
     """The name of an agent that the process that is asked has loaded."""
-    return Stage("humanoid", 6.0, StartNoise()).load(name).name
+    return TrialStage("humanoid", 6.0, StartNoise()).load(name).name
 
 
 #: ways to say a controller in a file: description → what is written there

@@ -43,17 +43,17 @@ def demo(
 
     Args:
         out: folder to write to; out/demo, or out/demo-full, if not given.
-        full: more pushes, random ones too, and a policy with feet fixed: some minutes.
+        full: push more, also at random, and add a policy with feet fixed: takes minutes.
         workers: number of processes; all cores if not given.
-        seed: of the pushes.
+        seed: seed of the pushes.
     """
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()
-    from .demo import demo
+    from .demo import run_demo
 
     folder = out or Path("out/demo-full" if full else "out/demo")
-    demo(folder, full=full, workers=workers, seed=seed, overwrite=overwrite, console=terminal())
+    run_demo(folder, full=full, workers=workers, seed=seed, overwrite=overwrite, console=terminal())
 
 
 def train() -> None:
@@ -93,10 +93,11 @@ def evaluate(
             torque), a .yaml file of a controller, a folder written by poise train, with --seeds
             too, or a class of your own, my_file.py:Class or module:Class. A class that a file or a
             folder names also needs --allow my_file.py:Class.
-        suite: strong (random pushes that separate good controllers), random, envelope, grid,
-            quiet, repeated, in-step, follow, those of poise benchmark, or a .yaml file.
+        suite: pushes to run: strong (random pushes that separate good controllers), random,
+            envelope, grid, quiet, repeated, in-step, follow, those of poise benchmark, or a .yaml
+            file.
         out: folder to write to; out/SUITE if not given.
-        seed: of the trials.
+        seed: seed of the trials.
         workers: number of processes; all cores if not given.
         trials: number of pushes (random), of starts (quiet), of trials per direction and controller
             in the second stage (envelope), of repeats (grid), of sequences (repeated, in-step); of
@@ -104,8 +105,8 @@ def evaluate(
         limits: a .yaml file of limits that scale the pushes; if not given, the packaged file of the
             robot, else its ankle limit.
         write_limits: write the first controller's J50s to this file, for --limits.
-        motions: what is performed in the suite follow: packaged clips or motions, .bvh, .npz or
-            .yaml files; its own if not given.
+        motions: motions of the suite follow: packaged clips or motions, .bvh, .npz or .yaml files;
+            those of the suite if not given.
         realism: realism level: ideal (an exact, undelayed state), lab, field, or a .yaml file; that
             of the suite if not given.
         get_up: give a robot that falls 10 s to get up again; the rate and the time are reported
@@ -165,14 +166,15 @@ def benchmark(
             a folder names also needs --allow my_file.py:Class); all packaged ones that can rest
             if not given.
         out: folder to write to; required, except with --submit.
-        suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
-            .yaml file.
-        seed: of the cases.
+        suite: pushes to run: quick (minutes), standard (an hour), full (many hours), those of poise
+            evaluate, or a .yaml file.
+        seed: seed of the cases.
         workers: number of processes; all cores if not given.
         trials: at most as many in every cell of the suite, to try things out; of a suite of one
             part, its number.
         realism: realism level: ideal, lab, field or a .yaml file; that of the suite if not given.
-        physics: mujoco, drake or a .yaml file of its settings; that of the suite if not given.
+        physics: the engine that steps the robot: mujoco, drake or a .yaml file of its settings;
+            that of the suite if not given.
         report: write report.html at the end, as poise report does.
         submit: run nothing; check this finished folder and pack it, without any code, into a .zip
             beside it, which you attach to the issue form for results.
@@ -243,9 +245,9 @@ def tune(
         controller: initial controller of the search: a packaged one or a .yaml file.
         robot: a packaged robot or a .yaml description.
         policy: a policy on top of the controller, which counts too.
-        generations: of the search.
+        generations: number of generations; that of the configuration if not given.
         minutes: time limit of the search; --resume continues it.
-        seed: of the search and its pushes.
+        seed: seed of the search and its pushes.
         workers: number of processes.
         resume: continue the search in the folder.
     """
@@ -280,8 +282,9 @@ def qp_set(
     Args:
         out: folder to write to: new, or empty.
         count: number of problems; 25 of each trial.
-        seed: of the pushes and starts.
-        form: reduced (dense, inequalities only) or full (accelerations and wrenches, equalities).
+        seed: seed of the pushes and starts.
+        form: form of the QP: reduced (dense, inequalities only) or full (accelerations and
+            wrenches, equalities).
         controller: a packaged controller or a .yaml file.
     """
     from poise.training.deploy.qp_set.export import write_qp_set
@@ -327,23 +330,23 @@ def robot(
         check_out_file(picture, "picture")
         choose_gl_backend()
     from poise.training.deploy.robot_check.check import check_robot
-    from poise.training.deploy.robot_check.tables import print_check
+    from poise.training.deploy.robot_check.tables import print_robot_check
     from poise.training.deploy.robot_check.written import load_and_write
 
     loaded, written = load_and_write(name)
     if written is not None:
         print(f"{written}: a guessed description, to correct and to name from now on")
     check = check_robot(loaded)
-    print_check(check, terminal(stderr=json))
+    print_robot_check(check, terminal(stderr=json))
     if json:
         print_json(check.to_json())
     if out is not None:
         write_atomic(out, dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
         terminal(stderr=json).print(str(out), soft_wrap=True)
     if picture is not None:
-        from poise.training.deploy.robot_check.picture import draw_robot
+        from poise.training.deploy.robot_check.picture import write_picture
 
-        draw_robot(loaded, picture)
+        write_picture(loaded, picture)
         print(picture)
 
 
@@ -359,18 +362,21 @@ def policies() -> None:
 
 def list_names(*, json: Json = False) -> None:
     """List what can be named: robots, controllers, policies with their J50, suites and the like."""
-    from poise.baselines.motion.clips.library import packaged_clips
-    from poise.baselines.motion.synthesis.scripts.library import packaged_scripts
-    from poise.training.running.options.names import named, suites_of_j50
+    from poise.baselines.extras import load_extra, missing_extra, registered
+    from poise.training.running.options.names import names_by_kind, suites_of_j50
     from poise.training.running.options.pages import print_names
 
-    more = {"clips": packaged_clips(), "scripts": packaged_scripts()}
+    further = {kind: missing_extra("names", kind) for kind in registered("names")}
+    more = {kind: load_extra("names", kind)() for kind, extra in further.items() if extra is None}
     if json:
-        print_json({**named(), **more})
+        print_json({**names_by_kind(), **more})
         return
-    print_names(named(), suites_of_j50(), terminal())
+    print_names(names_by_kind(), suites_of_j50(), terminal())
     for kind, names in more.items():
         print(f"{kind}: {', '.join(names)}")
+    for kind, extra in further.items():
+        if extra is not None:
+            print(f"{kind}: none without poise[{extra}]")
     print("also as controllers: zero, a folder written by poise train, my_file.py:Class")
 
 

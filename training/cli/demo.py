@@ -23,7 +23,7 @@ FULL_SUITES = ("demo-full-envelope", "demo-full-random")
 FILMED, VIDEO = 3, "push.mp4"  # how many controllers the video shows, its name
 
 
-def demo(
+def run_demo(
     out: str | Path,
     *,
     full: bool = False,

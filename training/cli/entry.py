@@ -12,7 +12,9 @@ from typing import TextIO
 import tyro
 
 import poise
+from poise.baselines.extras import load_extra
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
+from poise.configs.problems import Problem
 from poise.training.running.options.arguments import check_flags
 from poise.training.running.options.pages import print_commands
 from poise.training.running.options.parsing import answered
@@ -27,15 +29,15 @@ from poise.training.running.stopping import (
 from poise.training.running.terminal import speak_plainly, terminal
 
 from .commands import COMMANDS
-from .policies import run as run_policies
+from .policies import run_policies
 
 SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
 HELP = ("-h", "--help", "--help-all")
 ALONE = ("--help", "--version", "--print-completion")  # options without a command
 USAGE = """usage: poise COMMAND [OPTIONS]
 
-Keep a simulated humanoid on its feet while it is pushed. Start with: poise demo.
-poise COMMAND --help tells of a command, poise --version which version this is.
+Keep a simulated humanoid on its feet while it is pushed. To begin: poise demo.
+poise COMMAND --help lists the options of a command.
 """
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
@@ -52,7 +54,7 @@ def main(args: Sequence[str] | None = None) -> int:
         try:
             return _stoppable(args)
         except PoiseError as error:
-            print(f"poise: {error}", file=sys.stderr)
+            print_error(error)
             return 2
         finally:
             if sys.stdout is not None:  # poise list >&-
@@ -65,6 +67,11 @@ def main(args: Sequence[str] | None = None) -> int:
             for stream in unread:
                 os.dup2(nowhere.fileno(), stream.fileno())
         return 141
+
+
+def print_error(error: PoiseError) -> None:
+    """Print an error as the one line that it is."""
+    print(f"poise: {error}", file=sys.stderr)
 
 
 def _stoppable(args: list[str]) -> int:
@@ -121,21 +128,18 @@ def _run(args: list[str]) -> int:
         return 0
     name, given = args[0], respelled(args[0], args[1:])
     if name.startswith("-"):
-        raise ConfigError(f"no such option{suggestion(name, ALONE)}", field=name, choices=ALONE)
+        raise Problem("unknown option", None, name, ALONE, hint=suggestion(name, ALONE))
     if name not in COMMANDS:
-        raise ConfigError(
-            f"no such command: {shown(name)}{meant(name, COMMANDS)}", choices=COMMANDS
-        )
+        hint = meant(name, COMMANDS)
+        raise Problem("unknown command", None, None, COMMANDS, value=shown(name), hint=hint)
     if name == "train":  # its flags are the fields of a heavy dataclass
         check_flags(given, {"--config": "training", "--robot": "robots"})
-        from .train import run
+        from .train import run_train
 
-        run(given)
+        run_train(given)
         return 0
     if name == "motion":  # it has sub-commands
-        from .motion.commands import run as run_motion
-
-        return run_motion(given)
+        return int(load_extra("commands", name)(given))
     if name == "policies":  # it has one, too
         return run_policies(given)
     return answered(COMMANDS[name], given, f"poise {name}")

@@ -42,15 +42,15 @@ def check(
     from poise.baselines.allowance import allowing
     from poise.envs.robots.robot import load_robot
     from poise.training.deploy.policy_check.check import check_policy
-    from poise.training.deploy.policy_check.tables import print_check
+    from poise.training.deploy.policy_check.tables import print_policy_check
 
     with allowing(allow):
         found = check_policy(file, load_robot(robot), rollout)
-    print_check(found, terminal())
+    print_policy_check(found, terminal())
     return 0 if found.right else 1
 
 
-def run(args: Sequence[str]) -> int:
+def run_policies(args: Sequence[str]) -> int:
     """Run `poise policies`: the list, or the sub-command `check`."""
     if args and args[0] == "check":
         return answered(check, args[1:], "poise policies check")
@@ -65,20 +65,21 @@ def export(
     *,
     out: Path,
     result: Path | None = None,
-    licence: str | None = None,
+    licence: Annotated[str | None, tyro.conf.arg(metavar="LICENCE")] = None,
     allow: Allow = (),
 ) -> None:
     """Write a policy for other programs: ONNX, safetensors, Stable-Baselines3, a model card.
 
     The ONNX file is compared with the policy on 10,000 random observations first. The folder is
-    one that Hugging Face takes as it is. Needs pip install -e '.[export]' in a checkout.
+    one that Hugging Face takes as it is. Needs poise[export].
 
     Args:
         policy: a packaged policy (see poise list) or a folder written by poise train.
         out: folder to write to: new, or empty.
         result: a folder of poise evaluate or poise benchmark in which the policy took part, or its
             summary.json: its figures go into the card.
-        licence: of the policy, as Hugging Face abbreviates it; of a packaged one it is known.
+        licence: licence of the policy, by the abbreviation of Hugging Face; not needed for a
+            packaged policy.
     """
     from poise.training.benchmarking.trials.names import check_policy_name
 
@@ -103,15 +104,15 @@ def dataset(
 ) -> None:
     """Write trials as a data set of Minari: observations, actions, rewards, the push as arrays.
 
-    Needs pip install -e '.[dataset]' in a checkout.
+    Needs poise[dataset].
 
     Args:
-        controller: as poise evaluate takes one; its environment is that of the data.
+        controller: a controller as poise evaluate takes it; the data are of its environment.
         out: folder to write to: new, or empty; MINARI_DATASETS_PATH for what reads it.
-        name: of the data set, namespace/name-v0.
-        suite: of pushes: packaged or a .yaml file.
+        name: name of the data set, namespace/name-v0.
+        suite: suite of pushes: a packaged one or a .yaml file.
         trials: number of episodes; the suite's if not given.
-        seed: of the trials.
+        seed: seed of the trials.
     """
     from poise.training.benchmarking.trials.names import check_names
 

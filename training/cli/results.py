@@ -26,8 +26,8 @@ def compare(
     """Print the differences between two results, with intervals.
 
     Args:
-        a: written by poise benchmark or poise evaluate.
-        b: another of the same kind.
+        a: a folder written by poise benchmark or poise evaluate.
+        b: another folder of the same kind.
     """
     check_folders(a, b)
     from poise.training.benchmarking.results.compare import compare, print_comparison
@@ -51,7 +51,7 @@ def leaderboard(
     """Write the leaderboard page from benchmarks' results, or that of walks, or of scenarios.
 
     Args:
-        results: summary.json of poise benchmark, or of poise evaluate with a suite of walks such
+        results: a summary.json of poise benchmark, or of poise evaluate with a suite of walks such
             as walkers, or the folder that holds it. Controllers of later results are added, or
             take the place of earlier ones of their name.
         page: the Markdown file to write; docs/leaderboard.md, docs/walking-leaderboard.md for
@@ -77,9 +77,9 @@ def replay(
     """Simulate one trial of a result again and check that it ends as recorded.
 
     Args:
-        folder: written by poise evaluate or poise benchmark.
-        trial: its number in trials.csv.
-        controllers: which of the evaluated ones; the last if not given. A video shows several
+        folder: a folder written by poise evaluate or poise benchmark.
+        trial: number of the trial in trials.csv.
+        controllers: evaluated controllers to show; the last if not given. A video shows several
             side by side.
         video: an MP4 or WebP file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
@@ -137,7 +137,7 @@ def report(
     The file is self-contained.
 
     Args:
-        folder: written by poise evaluate or poise benchmark.
+        folder: a folder written by poise evaluate or poise benchmark.
         out: file to write; report.html in the folder if not given.
         films: simulate the worst trials again, for pictures and plots over time (seconds for each).
     """
@@ -168,9 +168,9 @@ def gallery(
     The file is self-contained: it needs neither server nor network.
 
     Args:
-        folder: written by poise evaluate or poise benchmark.
-        out: the HTML file.
-        controllers: which of the evaluated ones, from left to right; the best four if not given.
+        folder: a folder written by poise evaluate or poise benchmark.
+        out: the HTML file to write.
+        controllers: evaluated controllers to show, from left to right; the best four if not given.
         sizes: pushes in each of eight directions, from the smallest to the largest.
     """
     from poise.configs.outputs import check_out_file

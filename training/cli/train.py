@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, get_type_hints
+from typing import Annotated, Literal, get_type_hints
 
 import tyro
 
@@ -27,7 +27,7 @@ from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
 from poise.training.running.executor import Backend
 from poise.training.running.options.described import Option, kind_of, options_of, sentences
-from poise.training.running.options.pages import grouped, print_options
+from poise.training.running.options.pages import grouped, print_lines, print_options
 from poise.training.running.options.parsing import one_line_errors
 from poise.training.running.terminal import terminal
 
@@ -89,12 +89,12 @@ class Command:
     allow: Allow = ()
 
 
-def run(args: Sequence[str]) -> None:
+def run_train(args: Sequence[str]) -> None:
     """Parse and train, or print the help; raises ConfigError."""
     if {"-h", "--help", "--help-all"} & set(args):
-        print_help(train_config(_base(args)), everything="--help-all" in args)
+        print_train_help(train_config(_base(args)), everything="--help-all" in args)
         return
-    command = parse(args)
+    command = parse_train(args)
     out, allow = command.out, [*named(_peek(args).controller), *command.allow]
     if not command.seeds and not exists(out / SEEDS):
         note = steps_note(command.settings, out, command.resume)
@@ -170,31 +170,37 @@ def options(config: TrainConfig) -> list[Option]:
     """Return all options: the command's own, then the fields of the configuration."""
     helps, hints, own = sentences(Command), get_type_hints(Command), []
     for name, default in ((f.name, f.default) for f in fields(Command) if f.name != "settings"):
-        kind = "" if isinstance(default, bool) else kind_of(hints[name])
-        own.append(Option(f"--{name}", kind, helps[name], ""))
+        switch: Literal["one", ""] = "one" if isinstance(default, bool) else ""
+        kind = "" if switch else kind_of(hints[name])
+        own.append(Option(f"--{name}", kind, helps[name], "", switch=switch))
     return [*own, *options_of(config)]
 
 
-def print_help(config: TrainConfig, everything: bool) -> None:
+def print_train_help(config: TrainConfig, everything: bool) -> None:
     """The options that a first run needs, or all in groups, with the defaults of `config`."""
     console, found = terminal(), options(config)
-    console.print("usage: poise train --out DIR [OPTIONS]\n\nTrain a policy with PPO: "
-                  "poise train --quick is a first one, in some ten minutes.")  # fmt: skip
+    print_lines("usage: poise train --out PATH [OPTIONS]", console)
+    console.print()
+    print_lines("Train a policy with PPO: poise train --quick is a first one, in some ten minutes.",
+                console)  # fmt: skip
     first = [option for option in found if option.name[2:] in BASIC]
-    print_options("first of all", first, console)
+    print_options("options", first, console)
     if not everything:
         more = len(found) - len(first)
-        console.print(f"\n{more} more: poise train --help-all (docs/training.md#configuration)")
+        console.print()
+        print_lines(
+            f"{more} more: poise train --help-all (docs/training.md#configuration)", console
+        )
         return
     others = [option for option in found if option not in first]
     for title, group in grouped(others, GROUPS).items():
         print_options(title or "more of the run", group, console)
 
 
-def parse(args: Sequence[str]) -> Command:
+def parse_train(args: Sequence[str]) -> Command:
     """Return the command of these arguments, its configuration checked like one from a file."""
     base, quick = train_config(_base(args)), _peek(args).quick
-    with one_line_errors("poise train", [option.name for option in options(base)], args):
+    with one_line_errors("poise train", options(base), args):
         command = tyro.cli(
             Command,
             prog="poise train",

@@ -58,21 +58,21 @@ def view(
 
     Up to three controllers stand side by side and get the same pushes: by a button, or by dragging
     a body with the mouse. With --trial it is a trial of the result in DIR, with a timeline.
-    Needs pip install -e '.[view]' in a checkout, but for --native.
+    Needs poise[view], but for --native.
 
     Args:
         shown: controllers, feedback-step if not given; with --trial, a folder written by poise
             evaluate or poise benchmark.
-        motion: that is performed: a name, a .yaml, or a .npz of poise motion import.
+        motion: motion to perform: a name, a .yaml, or a .npz of poise motion import.
         host: address to serve at; the default is reachable from this machine only.
-        port: of the page; 0 is any that is free.
-        seed: of the start, which is a little disturbed.
+        port: port of the page; 0 is any that is free.
+        seed: seed of the slightly disturbed start.
         realism: realism level: ideal, lab, field, or a .yaml file.
-        trial: a trial's number in trials.csv.
-        controllers: with --trial, up to three of those that took part; the last if not given.
-        native: MuJoCo's own window, of one controller; it needs a display.
+        trial: number of a trial in trials.csv.
+        controllers: with --trial, up to three of the evaluated controllers; the last if not given.
+        native: show one controller in MuJoCo's own window; needs a display.
         seconds: end after this time and print the real-time factor.
-        dark: a dark page.
+        dark: show a dark page.
     """
     from poise.envs.viewing.gl import choose_gl_backend
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 import yaml
 
+from poise.baselines.extras import load_extra
 from poise.configs.errors import ConfigError, shown
 from poise.training.running.options.arguments import Allow, OnRobot, Switch
 from poise.training.running.terminal import terminal
@@ -24,12 +25,12 @@ def walk(
     clearance: float | None = None,
     arm_swing: float | None = None,
     duration: float = 20.0,
-    push: str | None = None,
+    push: Annotated[str | None, tyro.conf.arg(metavar="PUSH")] = None,
     push_at: float = 6.0,
     seed: int = 0,
     robot: OnRobot = "humanoid",
     controller: str = "walk",
-    terrain: str = "flat",
+    terrain: Annotated[str, tyro.conf.arg(metavar="TERRAIN")] = "flat",
     realism: str | None = None,
     physics: str | None = None,
     video: Path | None = None,
@@ -38,20 +39,22 @@ def walk(
     """Walk at a commanded speed, pushed or not, and print speed, steps, cost and falls.
 
     Args:
-        speed: ahead [m/s]; below 0 it walks backward.
-        left: sideways [m/s].
-        turn: to the left [deg/s].
-        step_time: from lift-off to touchdown [s]; by default the controller's own.
-        step_length: [m], in place of the step time.
-        width: between the soles [m]; by default the controller's own.
-        clearance: of the swinging sole at its highest [m]; by default the controller's own.
-        arm_swing: of the arms against the legs, to either side [rad]; by default free to balance.
-        duration: of the walk [s].
+        speed: commanded speed ahead [m/s]; below 0 backward.
+        left: commanded speed to the left [m/s].
+        turn: commanded turn to the left [deg/s].
+        step_time: time from lift-off to touchdown [s]; by default the controller's own.
+        step_length: length of a step [m], in place of the step time.
+        width: distance between the soles [m]; by default the controller's own.
+        clearance: largest height of the swinging sole [m]; by default the controller's own.
+        arm_swing: amplitude of the arms against the legs [rad]; by default free to balance.
+        duration: duration of the walk [s].
         push: an impulse [N·s] and a direction [deg, 0 ahead, 90 left] such as 20@90, for 0.1 s.
-        push_at: when it is pushed [s].
-        seed: of the start, which is a little disturbed.
-        controller: one that walks: a name, a .yaml file, or a folder written by poise train.
-        terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs, rise: 0.15}".
+        push_at: time of the push [s].
+        seed: seed of the slightly disturbed start.
+        controller: a controller that walks: a name, a .yaml file, or a folder written by poise
+            train.
+        terrain: kind of terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs,
+            rise: 0.15}".
         realism: realism level: ideal, lab, field, or a .yaml file.
         physics: the engine that steps the robot: mujoco, drake, or a .yaml file of its settings.
         video: an MP4 or WebP file to write.
@@ -68,12 +71,12 @@ def walk(
     from poise.training.benchmarking.trials.names import check_names
 
     check_names([controller], robot=robot, realism=realism, physics=physics)
-    from poise.training.pictures.sessions.walk import walk
+    from poise.training.pictures.sessions.walk import play_walk
 
     command = {"ahead": speed, "left": left, "turn": math.radians(turn), "step_time": step_time,
                "step_length": step_length, "width": width, "clearance": clearance,
                "arm_swing": arm_swing}  # fmt: skip
-    outcome = walk(
+    outcome = play_walk(
         command, duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
         realism=realism, physics=physics, push=push, push_at=push_at, seed=seed, video=video,
         say=_say, allow=allow,
@@ -115,29 +118,26 @@ def gait(
     """Compare how reference models walk: speed, cost, the stance knee beside a human's.
 
     Args:
-        compare: lip, rigid, spring, double, or controllers that walk.
+        compare: reference models: lip, rigid, spring, double, or controllers that walk.
         out: folder to write gaits.json and stance_knee.png to.
-        speeds: ahead [m/s].
+        speeds: commanded speeds ahead [m/s].
         starts: walks at each speed, from slightly disturbed initial states.
-        duration: of a walk [s].
-        seed: of the starts.
+        duration: duration of a walk [s].
+        seed: seed of the starts.
         human: a packaged band of the human knee's moment or a .yaml file of one.
         push: also measure J50 with the suite walk-push at 0.5 m/s; takes over an hour.
         push_suite: another suite with a part walk_push, or a .yaml file of one.
-        workers: processes of that suite; all cores if not given.
+        workers: number of processes of that suite; all cores if not given.
     """
     from poise.configs.files import resolve
     from poise.training.benchmarking.trials.names import check_names
 
     check_names(robot=robot, suite=push_suite)
     resolve("human", human)
-    from poise.training.motion.gaits.compare import compare_gaits
-    from poise.training.motion.gaits.figures import print_gaits
-
-    figures = compare_gaits(
+    figures = load_extra("motions", "compare_gaits")(
         compare, out=out, speeds=speeds, starts=starts, duration=duration, robot=robot, seed=seed,
         human=human, pushed=push, push_suite=push_suite, workers=workers, say=_say, allow=allow,
     )  # fmt: skip
-    print_gaits(figures, terminal())
+    load_extra("motions", "print_gaits")(figures, terminal())
     for name in ("gaits.json", "stance_knee.png"):
         print(out / name)

@@ -30,8 +30,8 @@ from .policy_files import (
     POLICY,
     STATE,
     STATISTICS,
-    beside,
-    check_robot,
+    check_policy_robot,
+    place_beside,
     read_parameters,
     read_state,
     read_statistics,
@@ -46,11 +46,11 @@ def save_checkpoint(
     folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, object]
 ) -> None:
     """Write the folder whole; raises PoiseError if it cannot be written."""
-    new, old = beside(folder, "new"), beside(folder, "old")
+    new, old = place_beside(folder, "new"), place_beside(folder, "old")
     try:
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir(parents=True)
-        plain(model).save(new / POLICY, exclude=LEFT_OUT)
+        plain_model(model).save(new / POLICY, exclude=LEFT_OUT)
         arrays: dict[str, Any] = statistics(normalize)
         np.savez(new / STATISTICS, **arrays)
         (new / CONFIG).write_text(to_yaml(config), "utf-8")
@@ -66,7 +66,7 @@ def save_checkpoint(
         raise PoiseError(f"{folder}: cannot be written ({reason})") from None
 
 
-def plain(model: PPO) -> PPO:
+def plain_model(model: PPO) -> PPO:
     """Return the model with nothing in it that is defined by Poise, so that SB3 alone can load it.
 
     It shares the weights. Its learning rate is the one at the start. Of a symmetric policy it is
@@ -93,7 +93,7 @@ def restore(
     that cannot be read or is for another robot than the one with this `fingerprint`.
     """
     state = read_state(folder / STATE)
-    check_robot(state, fingerprint, folder / STATE)
+    check_policy_robot(state, fingerprint, folder / STATE)
     parameters, own = read_parameters(folder / POLICY), model.policy.state_dict()
     stored = parameters["policy"]
     with parsing(folder / POLICY):

@@ -15,6 +15,7 @@ from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import ControllerConfig, controller_config
+from poise.baselines.walking.calibration import Calibration
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.files import resolve
 from poise.configs.schema import build, on_base, read_yaml
@@ -168,6 +169,7 @@ class TrainConfig:
         residual: What an action of 1 adds to each target, with `action` residual.
         step_residual: The same with `action` step or walk.
         command: The commands of a walk.
+        calibration: What the policy observes in the place of a command, with `action` velocity.
         servos: The servos of `action` position, velocity or whole.
         hand_over: When the servos take over, with `action` whole.
         physics_step: Physics step of the training episodes [s]; None: the robot's own, in which
@@ -196,6 +198,7 @@ class TrainConfig:
     residual: ResidualScales = field(default_factory=ResidualScales)
     step_residual: StepScales = field(default_factory=StepScales)
     command: CommandSampler = field(default_factory=CommandSampler, metadata={"omit": "default"})
+    calibration: Calibration = field(default_factory=Calibration, metadata={"omit": "default"})
     servos: ServoConfig = field(default_factory=ServoConfig)
     hand_over: HandOverConfig = field(default_factory=HandOverConfig, metadata={"omit": "default"})
     physics_step: float | None = field(default=None, metadata={"above": 0.0, "max": 0.01})
@@ -228,7 +231,8 @@ class TrainConfig:
             arguments = {"servos": self.servos, **overrides}
             return PositionBalanceEnv(robot or self.robot, self.env, **arguments)
         if self.action == "velocity":
-            arguments = {"servos": self.servos, "command": self.command, **overrides}
+            own = {"servos": self.servos, "command": self.command}
+            arguments = {**own, "calibration": self.calibration, **overrides}
             return VelocityEnv(robot or self.robot, self.env, **arguments)
         if "controller" not in overrides:  # an environment takes a name for what the user says
             overrides["controller"] = self.controller_below()

@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
 from poise.baselines.policy_files.joints import joint_servos
-from poise.baselines.policy_files.layers import Layers, read_layers
+from poise.baselines.policy_files.layers import NetworkLayers, read_layers
 from poise.baselines.policy_files.terms import meaning
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
@@ -200,7 +200,7 @@ def import_policy(
 
 
 def import_statistics(
-    inputs: Affine, layers: Layers, moments: RunningMeanStd, epsilon: float
+    inputs: Affine, layers: NetworkLayers, moments: RunningMeanStd, epsilon: float
 ) -> None:
     """Means and variances with which (o − mean)/√(var + ε) is the policy's normalised input.
 
@@ -216,7 +216,7 @@ def import_statistics(
 
 
 def first_layer(
-    inputs: Affine, layers: Layers, moments: RunningMeanStd, epsilon: float
+    inputs: Affine, layers: NetworkLayers, moments: RunningMeanStd, epsilon: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the policy's first layer, for observations that are normalised by these `moments`."""
     known = inputs.index >= 0

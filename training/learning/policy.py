@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.allowance import allowing, carried
+from poise.baselines.allowance import allowing, carrying_allowance
 from poise.configs.errors import ConfigError, PoiseWarning
 from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.reading import is_file, is_folder, parsing
@@ -27,7 +27,7 @@ from .policy_files import (
     STATE,
     STATISTICS,
     check_controller,
-    check_robot,
+    check_policy_robot,
     find_checkpoint,
     read_state,
     read_statistics,
@@ -79,7 +79,7 @@ class Policy(Copyable):
         self.mean, self.scale = mean, 1.0 / np.sqrt(var + epsilon)
         self.clip = clip
         self._activation = ACTIVATIONS[config.ppo.activation]
-        self._make_env = carried(config.make_env)
+        self._make_env = carrying_allowance(config.make_env)
 
     def act(self, observation: np.ndarray) -> np.ndarray:
         """Return the deterministic action (..., na) for raw observations (..., no).
@@ -197,7 +197,7 @@ def _read_policy(path: Path, robot: Robot | None) -> Policy:
     layers = _read_weights(path / POLICY)
     robot = robot or load_robot(config.robot)
     if not _in_other_physics(config, robot, state):
-        check_robot(state, robot.fingerprint, path / STATE)
+        check_policy_robot(state, robot.fingerprint, path / STATE)
     check_controller(state, config, path / STATE)
     env = config.make_env(robot)
     seen, outputs = env.observation_space.shape[0], env.action_space.shape[0]

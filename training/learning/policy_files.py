@@ -47,19 +47,19 @@ _VALUES = 100_000  # in a member
 
 def find_checkpoint(folder: Path) -> Path | None:
     """Return the folder, or what a kill in the middle of a replacement left of it."""
-    for candidate in (folder, beside(folder, "old")):
+    for candidate in (folder, place_beside(folder, "old")):
         if all(is_file(candidate / name) for name in FILES):
             return candidate
     return None
 
 
-def beside(folder: Path, suffix: str) -> Path:
+def place_beside(folder: Path, suffix: str) -> Path:
     """Return the place where a folder is built, or kept, while it is replaced."""
     folder = Path(os.path.abspath(folder))  # "." has no name
     return folder.parent / f".{folder.name}.{suffix}"
 
 
-def check_robot(state: dict[str, object], fingerprint: str, path: Path) -> None:
+def check_policy_robot(state: dict[str, object], fingerprint: str, path: Path) -> None:
     """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
     if state.get("fingerprint") != fingerprint:
         raise ConfigError(

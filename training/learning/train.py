@@ -73,7 +73,7 @@ def train(
     PoiseError when another process writes to `out`, or a file cannot be written.
     """
     out = Path(out)
-    checkpoint = check_folder(config, out, resume)
+    checkpoint = checkpoint_of(config, out, resume)
     keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
     start = None if checkpoint else first_policy(config.start_from)
     curriculum_levels(config)  # refused before anything is compiled
@@ -90,7 +90,7 @@ def train(
         normalize.seed(_env_seed(config.seed))
         state: dict[str, Any] = {}
         stack.enter_context(FolderLock(out))
-        checkpoint = check_folder(config, out, resume)  # another run may have ended since
+        checkpoint = checkpoint_of(config, out, resume)  # another run may have ended since
         if isinstance(start, Path):
             restore(start, model, normalize, robot.fingerprint, _seen(normalize))
         elif start is not None:
@@ -250,7 +250,7 @@ def _env_seed(seed: int) -> int:
     return int(np.random.SeedSequence(seed).generate_state(1)[0])
 
 
-def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
+def checkpoint_of(config: TrainConfig, out: Path, resume: bool) -> Path | None:
     """Return the checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
     check_out_folder(out)
     try:

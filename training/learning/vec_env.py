@@ -26,7 +26,9 @@ class ThreadedVecEnv(Copyable, VecEnv):
         super().__init__(len(envs), first.observation_space, first.action_space)
         self._returns = np.zeros(len(envs))
         self._actions: np.ndarray | None = None
-        self.reward_terms = self.batch.episodes.reward_terms.copy()  #: (n, terms) of the last step
+        self.reward_terms = self.batch.episodes[
+            "reward_terms"
+        ].copy()  #: (n, terms) of the last step
 
     def reset(self) -> np.ndarray:
         """Start all episodes, with what was last given to `seed` and `set_options`."""
@@ -61,7 +63,7 @@ class ThreadedVecEnv(Copyable, VecEnv):
         batch = self.batch
         assert self._actions is not None  # step_async came first
         batch.step(self._actions, at_end)
-        self.reward_terms = batch.episodes.reward_terms.copy()
+        self.reward_terms = batch.episodes["reward_terms"].copy()
         for i, terms in last.items():
             self.reward_terms[i] = terms
         dones = batch.ended

@@ -29,7 +29,7 @@ from poise.configs.schema import build, read_yaml
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, load_robot
 
-from .tracking.reference import ReferenceBodies, Stance
+from .tracking.reference import ReferenceBodies, SolePlaces
 
 LICENCE = "Apache-2.0"
 TOE = 0.8  # of the way to the front of the sole
@@ -83,7 +83,7 @@ def _postures(robot: Robot, path: Path) -> np.ndarray:
 
 def postures_of(motion: ReferenceMotion, robot: Robot) -> np.ndarray:
     """Return the postures (F, nq) of a motion whose soles stay, `RATE` apart."""
-    bodies, stance = ReferenceBodies(motion, robot), Stance.of(Simulation(robot).state)
+    bodies, stance = ReferenceBodies(motion, robot), SolePlaces.of(Simulation(robot).state)
     found = []
     for time in np.arange(0.0, motion.duration + 0.5 * RATE, RATE):
         bodies.at(time, stance)

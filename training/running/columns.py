@@ -282,7 +282,9 @@ FOLLOWED = (
            where=lambda entry: entry.get("surfaces_passed") is not None),  # else no edges
 )  # fmt: skip
 STEPS = (
-    Figure("steps_as_told_rate", "steps as commanded", ".0%", words="no fall, all within 10 %"),
+    Figure(
+        "steps_as_commanded_rate", "steps as commanded", ".0%", words="no fall, all within 10 %"
+    ),
     Figure("step_error", "step error", ".1%", words="largest of the commanded step parameters"),
     Figure("step_length", "step", ".3f", "m", "length, along the heading"),
     Figure("step_width", "width", ".3f", "m", "of a step, across the heading"),

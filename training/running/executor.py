@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from typing import Literal, TypeVar
 
-from poise.baselines.allowance import carried
+from poise.baselines.allowance import carrying_allowance
 from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.configs.extras import how_to_install
 
@@ -91,8 +91,8 @@ class Executor:
         if not jobs:
             return iter(())
         if self._pool is not None:
-            return self._pool.each(carried(function), jobs)
-        return self._with_joblib(carried(function), jobs)
+            return self._pool.each(carrying_allowance(function), jobs)
+        return self._with_joblib(carrying_allowance(function), jobs)
 
     def _with_joblib(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]

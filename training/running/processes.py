@@ -66,7 +66,7 @@ class WorkerPool:
 
         Raises PoiseError when two workers have died on one job, and whatever the function raises.
         """
-        waiting = deque(Task(function, job) for job in jobs)
+        waiting = deque(PendingJob(function, job) for job in jobs)
         for _ in range(len(waiting)):
             task, result = self._next(waiting)
             self._hand_out(waiting)  # workers run while the caller handles the result
@@ -89,7 +89,9 @@ class WorkerPool:
             worker.connection.close()
         self.workers.clear()
 
-    def _next(self, waiting: deque[Task[Job, Result]]) -> tuple[Task[Job, Result], Result]:
+    def _next(
+        self, waiting: deque[PendingJob[Job, Result]]
+    ) -> tuple[PendingJob[Job, Result], Result]:
         """Return the next completed task with its result."""
         while True:
             self._hand_out(waiting)
@@ -118,7 +120,7 @@ class WorkerPool:
                 raise value from WorkerTraceback(where)
             return task, value
 
-    def _hand_out(self, waiting: deque[Task]) -> None:
+    def _hand_out(self, waiting: deque[PendingJob]) -> None:
         """Assign tasks to idle workers, and to new ones up to `count`."""
         for worker in [worker for worker in self.workers if not worker.task]:
             if waiting:
@@ -130,7 +132,7 @@ class WorkerPool:
 
 
 @dataclass(eq=False)
-class Task(Generic[Job, Result]):
+class PendingJob(Generic[Job, Result]):
     """A job, and the number of workers that have died on it."""
 
     function: Callable[[Job], Result]
@@ -143,13 +145,13 @@ class Worker:
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
-        self.task: Task | None = None
+        self.task: PendingJob | None = None
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs,))
         self.process.start()
         theirs.close()  # only the worker holds it: its death closes the pipe
 
-    def give(self, task: Task) -> None:
+    def give(self, task: PendingJob) -> None:
         """Start the task in the worker."""
         self.task = task
         content = pickle.dumps((task.function, task.job))

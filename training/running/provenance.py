@@ -38,7 +38,7 @@ class Circumstances(TypedDict):
 def circumstances(started: float, workers: int, backend: str) -> Circumstances:
     """Return the origin of a result of this process; `started` is a `time.perf_counter` value."""
     return {
-        "command": command(),
+        "command": command_line(),
         "versions": versions(),
         "machine": machine(),
         "workers": workers,
@@ -48,7 +48,7 @@ def circumstances(started: float, workers: int, backend: str) -> Circumstances:
     }
 
 
-def command() -> str:
+def command_line() -> str:
     """Return the command line without the program's folder."""
     program = Path(sys.argv[0]).name
     return shlex.join(["poise" if program == "__main__.py" else program, *sys.argv[1:]])

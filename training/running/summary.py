@@ -171,18 +171,20 @@ class Entry(Counts, EnvelopeFigures, Fractions, total=False):
     """A controller.
 
     The counts are of the rated part, else of all trials; of pushed walks, of those common to all
-    controllers. `played` counts all trials, `errors` those in which the controller raised.
+    controllers. `evaluated` counts all trials, `errors` those in which the controller raised.
     `losses` lists the causes, the most frequent first. J50, ranking, pairs and losses use the
-    `criterion`; older results, which lack it, use "recovered".
+    `criterion`; older results, which lack it, use "recovered". `stand_ins` counts the trials in
+    which another controller ran in place of the named one, see its `uncertain`.
     """
 
-    played: Required[int]
+    evaluated: Required[int]
     errors: Required[int]
     criterion: Criterion
     losses: list[Loss]
     tick_us: Number
     fingerprint: str
     timesteps: int
+    stand_ins: dict[str, int]
     factors: list[Factor]
     eurobench: Eurobench
     walks: list[WalkLevel]

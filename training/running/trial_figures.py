@@ -32,7 +32,7 @@ class Rate(TypedDict):
     never_fell_ci95: NotRequired[Interval]
 
 
-class Rising(TypedDict, total=False):
+class RisingFigures(TypedDict, total=False):
     """Robots that were down, after a fall or from the start, and the share that got up again."""
 
     downs: int
@@ -41,7 +41,7 @@ class Rising(TypedDict, total=False):
     up_time_median: Number
 
 
-class Counts(Rate, Rising, total=False):
+class Counts(Rate, RisingFigures, total=False):
     """Counts of outcomes, and medians of recorded figures."""
 
     recovered_with_step: int
@@ -102,7 +102,7 @@ class StepsAsCommanded(TypedDict, total=False):
     """The rate of walks without a fall whose steps are within 10 % of each commanded step
     parameter."""
 
-    steps_as_told_rate: float
+    steps_as_commanded_rate: float
 
 
 class WalkLevel(Rate, StepsAsCommanded, WalkMeans, total=False):

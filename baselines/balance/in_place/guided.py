@@ -7,6 +7,8 @@ import numpy as np
 from poise.baselines.controller import Targets
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.momentum_qp import AroundQP
+from poise.baselines.whole_body.tasks.com import CoMBlock
+from poise.configs.errors import ConfigError
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -21,6 +23,12 @@ class Guided(AroundQP, ABC):
 
     def __init__(self, robot: Robot, qp: MomentumQPConfig):
         super().__init__(robot, qp)
+        task = self.qp.tasks.get("com")
+        if task is None or not isinstance(task.block, CoMBlock):
+            raise ConfigError(
+                "must be a task of kind 'com', whose gains are taken out", field="qp.com"
+            )
+        self._com: CoMBlock = task.block
         self._guided: Targets | None = None
 
     @abstractmethod
@@ -33,11 +41,11 @@ class Guided(AroundQP, ABC):
         guided = self._guided
         guided.take(targets)
         p = self.cop(state, targets)
-        gains = self.qp.parameters
+        gains = self._com
         guided.com_acc[:2] += (
             state.omega**2 * (state.com[:2] - p)
-            - gains.com_stiffness[:2] * (targets.com[:2] - state.com[:2])
-            - gains.com_damping[:2] * (targets.com_vel[:2] - state.com_vel[:2])
+            - gains.stiffness[:2] * (targets.com[:2] - state.com[:2])
+            - gains.damping[:2] * (targets.com_vel[:2] - state.com_vel[:2])
         )
         guided.cop[:] = p
         return self.qp.torques(state, guided)

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from poise.baselines.controller import BaseController, Targets
-from poise.baselines.whole_body.parameters import joint_kinds
+from poise.baselines.whole_body.tasks.posture import joint_kinds
 from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -46,7 +46,7 @@ def joint_gains(robot: RobotArrays, gains: PDGains) -> tuple[np.ndarray, np.ndar
     return stiffness, gains.damping * stiffness / units.omega
 
 
-def holding_torques(state: RobotState) -> np.ndarray:
+def joint_holding_torques(state: RobotState) -> np.ndarray:
     """(nv−6,) torques of v̇ = 0: gravity and bias, carried by the soles with the least effort."""
     return joint_torques(state, sole_wrenches(state, state.A_bias))
 
@@ -65,7 +65,7 @@ class PD(BaseController):
         tau = self.stiffness * (targets.q_ref - state.q)
         tau += self.damping * (targets.v_ref - state.qvel[6:])
         if self.config.feedforward:
-            tau += holding_torques(state)
+            tau += joint_holding_torques(state)
         return motor_torques(self.arrays, tau)
 
 
@@ -104,7 +104,7 @@ class StablePD(PD):
         tau = self.stiffness * (targets.q_ref - state.q - self.period * v)
         tau += self.damping * (targets.v_ref - v)
         if self.config.feedforward:
-            tau += holding_torques(state)
+            tau += joint_holding_torques(state)
         tau -= self.damping * self.period * self.acceleration(state, tau)[6:]
         return motor_torques(self.arrays, tau)
 

@@ -29,6 +29,17 @@ ROLLED, MOST_ROLL = 0.4, 0.1  # least rate of a joint that the root's roll helps
 AWAY, AWAY_BOTH = 0.04, 0.1  # [m] that the ZMP may be from where it is planned; and on both soles,
 # which bear it anywhere between them
 UNREACHED = 2e-3  # [m, rad] that a sole or the CoM may be off
+#: steps in which the CoM is lowered where legs do not reach [m], and the time to either side over
+#: which that grows [s]
+SINK, SINKING = 0.005, 0.25
+
+
+class NotReached(ConfigError):
+    """A plan that lacks a little, or much: `by` [m, rad]."""
+
+    def __init__(self, message: str, by: float, source: str):
+        super().__init__(message, source=source, field="feet")
+        self.by = by
 
 
 class FootPlan(NamedTuple):
@@ -112,14 +123,16 @@ def _eased(count: int) -> np.ndarray:
     return ease(u)
 
 
-def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
+def perform_plan(robot: Robot, plan: FootPlan, source: str, sink: float = 0.0) -> np.ndarray:
     """(F, nq) postures of a plan: the CoM over its ZMP, and legs that reach their soles.
+
+    Where legs do not reach, the CoM is lower than planned, by up to `sink` [m].
 
     The CoM c solves c − h/(g + c̈_z) c̈ = p. What the limbs' angular momentum moves the ZMP by is
     then taken off p, and the root rolled where a leg's joint is at its limit, a few times.
 
     Raises:
-        ConfigError: a place that the legs cannot reach, a joint out of its range, or limbs whose
+        NotReached: a place that the legs cannot reach, a joint out of its range, or limbs whose
             angular momentum takes the ZMP 4 cm from where it is planned.
     """
     if len(plan.height) < 2.0 * LEAD / plan.dt + 2.0:
@@ -130,14 +143,19 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     times = np.arange(len(plan.height)) * plan.dt
     standing = standing_data(robot).subtree_com[robot.root_body_id]
     zmp = plan_zmp(robot, plan, standing[:2] - feet.mean(axis=0)[:2])
-    vertical = rest_spline(times, plan.height[:, None])(times, 2)[:, 0]
-    gravity = robot.units.gravity
-    share = plan.height / np.maximum(gravity + vertical, FLOATS * gravity) / plan.dt**2
+    gravity, top = robot.units.gravity, plan.height
     wanted, whole, qpos = zmp.copy(), np.empty((0, 3)), np.empty((0, robot.model.nq))
     for k in range(ROUNDS):
-        com = _led(com_over(wanted, share, zmp[0], zmp[-1]), int(LEAD / plan.dt))
-        whole = np.column_stack([com, plan.height + ground])
-        qpos, turns = _reached(robot, legs, plan, whole, ground, source)
+        while True:
+            vertical = rest_spline(times, plan.height[:, None])(times, 2)[:, 0]
+            share = plan.height / np.maximum(gravity + vertical, FLOATS * gravity) / plan.dt**2
+            com = _led(com_over(wanted, share, zmp[0], zmp[-1]), int(LEAD / plan.dt))
+            whole = np.column_stack([com, plan.height + ground])
+            left = sink - (top - plan.height)
+            qpos, turns, lacks = _reached(robot, legs, plan, whole, ground, source, left)
+            if not lacks.any():
+                break
+            plan = plan._replace(height=plan.height - _sunk(lacks, plan.dt))
         if k + 1 < ROUNDS:
             wanted = zmp + momentum_offset(robot, qpos, plan.dt)
             if k < ROLLING:
@@ -145,15 +163,15 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     away = np.linalg.norm(real_zmp(robot, qpos, whole - [0.0, 0.0, ground], plan.dt) - zmp, axis=1)
     away = np.nan_to_num(away) * np.where(plan.planted.sum(axis=1) == 1, 1.0, AWAY / AWAY_BOTH)
     if away.max() > AWAY:
-        raise ConfigError(
+        raise NotReached(
             f"the limbs swing too fast: the ZMP is {100 * away.max():.1f} cm from where the soles "
-            f"bear it at {times[int(np.argmax(away))]:.2f} s", source=source, field="feet",
+            f"bear it at {times[int(np.argmax(away))]:.2f} s", float(away.max()) - AWAY, source,
         )  # fmt: skip
     frame, joint, beyond = most_beyond(robot, qpos[:, 7:])
     if beyond > 0.0:
-        raise ConfigError(
+        raise NotReached(
             f"joint {robot.joint_names[joint]!r} would be {np.degrees(beyond):.2g}° "
-            f"beyond its range at {times[frame]:.2f} s", source=source, field="feet",
+            f"beyond its range at {times[frame]:.2f} s", beyond, source,
         )  # fmt: skip
     return qpos
 
@@ -169,11 +187,14 @@ def real_zmp(robot: Robot, qpos: np.ndarray, com: np.ndarray, dt: float) -> np.n
 
 
 def _reached(
-    robot: Robot, legs: PlantedLegs, plan: FootPlan, com: np.ndarray, ground: float, source: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Postures (F, nq), and rolls (F, 3) of the root that bring the legs into their range."""
-    qpos, guess = np.empty((len(com), robot.model.nq)), robot.standing_qpos[7:]
-    turned = np.zeros((len(com), 3))
+    robot: Robot, legs: PlantedLegs, plan: FootPlan, com: np.ndarray, ground: float, source: str,
+    sink: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Postures (F, nq), rolls (F, 3) of the root that bring the legs into their range, and by how
+    much lower, up to `sink` (F,), the CoM (F,) must be for legs to reach [m]."""
+    qpos, rest = np.empty((len(com), robot.model.nq)), robot.standing_qpos[7:]
+    guess = rest
+    turned, lacks = np.zeros((len(com), 3)), np.zeros(len(com))
     low, high = (robot.joint_range[legs.legs] + [MARGIN, -MARGIN]).T
     axes = Rotation.from_rotvec(plan.turns.reshape(-1, 3)).as_matrix().reshape(-1, 2, 3, 3)
     for k, place in enumerate(com):
@@ -181,11 +202,17 @@ def _reached(
                  for i in range(2)]  # fmt: skip
         others = plan.joints[k, legs.others]
         qpos[k], miss = legs.reach_soles(place, plan.root[k], others, guess, soles)
+        first = miss
+        while miss > UNREACHED and lacks[k] + SINK <= sink[k]:
+            lacks[k] += SINK
+            lower = place - [0.0, 0.0, lacks[k]]
+            for begin in (guess, rest):  # a straight leg does not bend from itself
+                qpos[k], miss = legs.reach_soles(lower, plan.root[k], others, begin, soles)
+                if miss <= UNREACHED:
+                    break
         if miss > UNREACHED:
-            raise ConfigError(
-                f"the legs cannot reach at {k * plan.dt:.2f} s: {100 * miss:.1f} cm lack",
-                source=source, field="feet",
-            )  # fmt: skip
+            raise NotReached(f"the legs cannot reach at {k * plan.dt:.2f} s: {100 * first:.1f} cm "
+                             "lack", first, source)  # fmt: skip
         guess = qpos[k, 7:]
         q = guess[legs.legs]
         excess = np.maximum(q - high, 0.0) - np.maximum(low - q, 0.0)
@@ -196,7 +223,15 @@ def _reached(
             needed = np.where(np.abs(rolls) > ROLLED, -excess / rolls, 0.0)
             roll = np.clip(needed[np.argmax(np.abs(needed))], -MOST_ROLL, MOST_ROLL)
             turned[k] = roll * axis
-    return qpos, turned
+    return qpos, turned, lacks
+
+
+def _sunk(lacks: np.ndarray, dt: float) -> np.ndarray:
+    """(F,) at least `lacks`, without corners: what is lacking grows and fades in a quarter second
+    before and after."""
+    width = SINKING / dt
+    wide = scipy.ndimage.maximum_filter1d(lacks, 2 * int(width) + 1)
+    return np.asarray(scipy.ndimage.gaussian_filter1d(wide, 0.4 * width, truncate=2.5))
 
 
 def _smoothed(turns: np.ndarray, width: float) -> np.ndarray:

@@ -11,16 +11,29 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
+from .footfalls import COLUMNS as COLUMNS_OF_STEPS
+from .footfalls import landings
 from .footing import Footing
 from .legs import PlantedLegs
 from .splines import evaluate
 
 STILL = 1e-6  # [rad, m] by which a posture that is held may change
-#: columns of commands: [s], [m/s] twice, [rad/s], [s] from lift-off to touchdown
-START, AHEAD, LEFT, TURN, STEP_TIME, COLUMNS = 0, 1, 2, 3, 4, 5
 MOST_COMMANDS = 200  # rows
 SHIFT, END = 0.7, 1.5  # [s] in which the weight shifts to the first foot; and to stand at the end
 RAMP, TURN_RAMP = 0.015, 0.08  # [g], [ω²] by which a planner approaches the command
+
+
+class WalkCommand(NamedTuple):
+    """A row of a motion's commands; of `WalkCommand(*commands.T)` the fields are the columns."""
+
+    start: float | np.ndarray  #: [s]
+    ahead: float | np.ndarray  #: [m/s]
+    left: float | np.ndarray  #: [m/s]
+    turn: float | np.ndarray  #: [rad/s]
+    step_time: float | np.ndarray  #: from lift-off to touchdown [s]
+
+
+COLUMNS = len(WalkCommand._fields)
 
 
 class MotionSample(NamedTuple):
@@ -48,8 +61,9 @@ class ReferenceMotion(Copyable):
 
     Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see
     `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation. With
-    `commands` (n, 5), of the columns START to STEP_TIME, it is what trunk and arms do while the
-    robot walks as commanded.
+    `commands` (n, 5), whose rows are `WalkCommand`s, it is what trunk and arms do while the
+    robot walks as commanded. `walked` (n, 4) are the footfalls of the clip that is walked so, see
+    `footfalls`.
     """
 
     name: str
@@ -58,6 +72,14 @@ class ReferenceMotion(Copyable):
     loop: bool
     footing: Footing | None = None  # None: both soles stay planted
     commands: np.ndarray | None = None  # None: it does not walk
+    walked: np.ndarray | None = None  # None: not known, or its own soles step
+
+    @property
+    def footfalls(self) -> np.ndarray:
+        """(n, 4) when each foot lands, and where from the other one; see `footfalls`."""
+        if self.footing is not None:
+            return landings(self.footing)
+        return np.empty((0, COLUMNS_OF_STEPS)) if self.walked is None else self.walked
 
     @property
     def duration(self) -> float:
@@ -75,7 +97,9 @@ class ReferenceMotion(Copyable):
         coeffs = self.coeffs * powers[:, None]
         footing = None if self.footing is None else self.footing.at_speed(factor)
         commands = None if self.commands is None else faster(self.commands, factor)
-        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing, commands)
+        walked = None if self.walked is None else self.walked / [factor, 1.0, 1.0, 1.0]
+        knots = self.knots / factor
+        return ReferenceMotion(self.name, knots, coeffs, self.loop, footing, commands, walked)
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""
@@ -91,7 +115,8 @@ def check_commands(commands: np.ndarray, source: str) -> None:
     if not shaped or not 1 <= len(commands) <= MOST_COMMANDS or not np.isfinite(commands).all():
         raise ConfigError(f"must be 1 to {MOST_COMMANDS} rows of {COLUMNS} numbers", source=source,
                           field="commands")  # fmt: skip
-    if commands[0, START] != 0.0 or (np.diff(commands[:, START]) <= 0.0).any():
+    start = np.asarray(WalkCommand(*commands.T).start)
+    if start[0] != 0.0 or (np.diff(start) <= 0.0).any():
         raise ConfigError("times must rise from 0", source=source, field="commands")
 
 
@@ -114,16 +139,17 @@ def whole_walk(
         rest + way * (joints[0] - rest), joints, joints[-1] + back * (rest - joints[-1])
     ])  # fmt: skip
     walked = commands.copy()
-    walked[:, START] += first * dt
-    begin, end = commands[:1].copy(), np.zeros((1, COLUMNS))
-    begin[0, START], end[0, START] = min(SHIFT, 0.5 * first * dt), (first + len(qpos) - 1) * dt
-    return joints, np.concatenate([begin, walked, end])
+    np.asarray(WalkCommand(*walked.T).start)[:] += first * dt
+    begin = WalkCommand(*commands[0])._replace(start=min(SHIFT, 0.5 * first * dt))
+    end = WalkCommand((first + len(qpos) - 1) * dt, 0.0, 0.0, 0.0, 0.0)
+    return joints, np.concatenate([[begin], walked, [end]])
 
 
 def _ramp(robot: Robot, row: np.ndarray) -> float:
     """Time from standing to a command [s]."""
-    speed = float(np.hypot(row[AHEAD], row[LEFT])) / (RAMP * robot.units.gravity)
-    return max(speed, abs(float(row[TURN])) / (TURN_RAMP * robot.omega**2))
+    command = WalkCommand(*row.tolist())
+    speed = float(np.hypot(command.ahead, command.left)) / (RAMP * robot.units.gravity)
+    return max(speed, abs(float(command.turn)) / (TURN_RAMP * robot.omega**2))
 
 
 def faster(commands: np.ndarray, factor: float) -> np.ndarray:

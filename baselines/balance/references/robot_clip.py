@@ -17,9 +17,10 @@ from poise.configs.schema import build
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 
+from .footfalls import footfalls
 from .footing import check_planted, make_footing, sole_poses
 from .postures import LevelKinematics, most_beyond
-from .reference_motion import ReferenceMotion, check_commands, whole_walk
+from .reference_motion import ReferenceMotion, WalkCommand, check_commands, whole_walk
 from .splines import piecewise, rest_spline
 
 RATE = 1.0 / 30.0  # [s] between the postures of the clips that are made here
@@ -163,13 +164,17 @@ def reference_from(
         ConfigError: postures of another robot, or such as can only be seen; a joint out of its
             range, or soles that leave their plane by 2 cm though they are planted.
     """
-    check_robot(clip, robot, source)
+    check_clip_robot(clip, robot, source)
     if clip.about.unperformed:
         raise ConfigError(f"can be seen, but not performed: {clip.about.unperformed}",
                           source=source, field="motion")  # fmt: skip
-    joints, dt, commands = clip.qpos[:, 7:], clip.dt, clip.commands
+    joints, dt, commands, walked = clip.qpos[:, 7:], clip.dt, clip.commands, None
     if commands is not None:
         joints, commands = whole_walk(robot, clip.qpos, dt, commands)
+        if clip.planted is not None:
+            _, places, turns = sole_poses(robot, clip.qpos)
+            at = WalkCommand(*commands[1]).start + np.arange(len(clip.qpos)) * dt
+            walked = footfalls(at, places, turns, clip.planted)
     elif clip.planted is not None:
         return stepped_reference(
             clip.about.name, robot, clip.qpos, clip.dt, clip.planted, source
@@ -185,10 +190,10 @@ def reference_from(
     spline = rest_spline if rest else make_interp_spline  # the latter without a knot near ends
     splines = [spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
-    return ReferenceMotion(clip.about.name, knots, coeffs, loop=False, commands=commands)
+    return ReferenceMotion(clip.about.name, knots, coeffs, False, None, commands, walked)
 
 
-def check_robot(clip: RobotClip, robot: Robot, source: str) -> None:
+def check_clip_robot(clip: RobotClip, robot: Robot, source: str) -> None:
     """Raise ConfigError unless the postures are of this robot."""
     if clip.about.fingerprint != robot.fingerprint:
         raise ConfigError(

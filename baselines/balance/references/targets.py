@@ -9,6 +9,8 @@ from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into, rotated
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -16,12 +18,7 @@ from .reference_motion import ReferenceMotion
 from .splines import evaluate
 from .tempo import Pace, Tempo, make_pace, slow_down
 
-"""The order of what may be added to a controller's choices: one table for all that use it.
-
-Offsets of targets come first, see `update_targets`; those of steps follow, see `StepOffsets` in
-`stepping/controller.py`. Horizontal ones are along the axes of a heading.
-"""
-
+#: the order of `Offsets.values`: those of targets come first, see `update_targets`, then of steps
 NAMES = (
     "com_x", "com_y",  # of the CoM [m]
     "cop_x", "cop_y",  # of the CoP [m]
@@ -32,10 +29,35 @@ NAMES = (
     "time",  # from lift-off to touchdown [s]
     "trigger",  # how much further the capture point may leave before a step [m]
 )  # fmt: skip
-COM_X, COM_Y, COP_X, COP_Y, COM_Z, LEAN_X, LEAN_Y, MOMENTUM_X, MOMENTUM_Y = range(9)
-FOOTHOLD_X, FOOTHOLD_Y, TIME, TRIGGER = range(9, 13)
-TARGETS = NAMES[:FOOTHOLD_X]  # those of a controller with feet fixed
-STEPS = NAMES[FOOTHOLD_X:]
+TARGETS = NAMES[:9]  # those of a controller with feet fixed
+STEPS = NAMES[9:]
+
+
+@dataclass(eq=False)
+class Offsets(Block):
+    """The offsets that a policy adds to a controller's choices, in axes of the heading.
+
+    Zeros add nothing. `values` is all of them in the order of `NAMES`; the others are its parts.
+    """
+
+    values: np.ndarray  # (13,)
+    com: np.ndarray  # (2,) of the CoM; in a step, of where the capture point is to rest [m]
+    cop: np.ndarray  # (2,) of the CoP [m]
+    height: Mutable[float]  # of the CoM [m]
+    lean: np.ndarray  # (2,) of the root about x and y [rad]
+    momentum: np.ndarray  # (2,) angular, that the posture carries [N·m·s]
+    foothold: np.ndarray  # (2,) [m]
+    time: Mutable[float]  # from lift-off to touchdown [s]
+    trigger: Mutable[float]  # how much further ξ may leave before a step [m]
+
+
+def no_offsets() -> Offsets:
+    """Offsets of zero."""
+    v = guarded_zeros(len(NAMES))
+    return Offsets.allocate(
+        values=v, com=v[0:2], cop=v[2:4], height=v[4:5], lean=v[5:7], momentum=v[7:9],
+        foothold=v[9:11], time=v[11:12], trigger=v[12:13],
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +88,13 @@ def update_targets(
     motion: Motion,
     time: float,
     com_offset: float,
-    residual: np.ndarray,
+    offsets: Offsets,
     t: TargetArrays,
 ):
-    """Fill `t` for the motion's `time` [s]: its joints and CoM, moved by the residual.
+    """Fill `t` for the motion's `time` [s]: its joints and CoM, moved by the offsets.
 
     Heading frame: the motion's CoM is relative to the mean of the sole points, `com_offset` [m]
-    forward of it; p_ref lies under it. `residual` (≥ 9,), in the order of `TARGETS`, adds
-    Δc_ref (x, y) and Δp_ref (x, y) [m], the CoM's height [m], a lean of the root, a rotation about
-    the axes x and y [rad], and the angular momentum that the posture is to carry about x and y
-    [N·m·s].
+    forward of it; p_ref lies under it. The lean of `offsets` is a rotation about the axes x and y.
     The root's reference is R = R_heading exp(φ) R_standing; its rate R_heading φ̇ is exact while φ
     keeps its axis, as it does in every motion that bows or leans.
     """
@@ -86,23 +105,23 @@ def update_targets(
     copy_into(samples[1], t.v_ref)
     copy_into(samples[2], t.a_ref)
     cos, sin = s.heading[0], s.heading[1]
-    samples[0, nj + 3] += residual[LEAN_X]
-    samples[0, nj + 4] += residual[LEAN_Y]
+    samples[0, nj + 3] += offsets.lean[0]
+    samples[0, nj + 4] += offsets.lean[1]
     root_reference(robot, cos, sin, samples[:, nj + 3 : nj + 6], t)
     middle_x, middle_y = samples[0, nj] + com_offset, samples[0, nj + 1]
-    x, y = middle_x + residual[COM_X], middle_y + residual[COM_Y]
+    x, y = middle_x + offsets.com[0], middle_y + offsets.com[1]
     t.com[0] = s.origin[0] + cos * x - sin * y
     t.com[1] = s.origin[1] + sin * x + cos * y
-    t.com[2] = s.origin[2] + samples[0, nj + 2] + residual[COM_Z]
+    t.com[2] = s.origin[2] + samples[0, nj + 2] + offsets.height
     for r in range(2):
         out = t.com_vel if r == 0 else t.com_acc
         x, y = samples[1 + r, nj], samples[1 + r, nj + 1]
         out[0] = cos * x - sin * y
         out[1] = sin * x + cos * y
         out[2] = samples[1 + r, nj + 2]
-    t.angular_momentum[0] = cos * residual[MOMENTUM_X] - sin * residual[MOMENTUM_Y]
-    t.angular_momentum[1] = sin * residual[MOMENTUM_X] + cos * residual[MOMENTUM_Y]
-    x, y = middle_x + residual[COP_X], middle_y + residual[COP_Y]
+    t.angular_momentum[0] = cos * offsets.momentum[0] - sin * offsets.momentum[1]
+    t.angular_momentum[1] = sin * offsets.momentum[0] + cos * offsets.momentum[1]
+    x, y = middle_x + offsets.cop[0], middle_y + offsets.cop[1]
     t.cop[0] = s.origin[0] + cos * x - sin * y
     t.cop[1] = s.origin[1] + sin * x + cos * y
 

@@ -1,21 +1,19 @@
 """How fast a motion's time runs: it may wait while the robot catches itself."""
 
 from dataclasses import asdict, dataclass, field
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.kinematics import StateArrays
 
 AFTER = ("resume", "catch-up", "restart")
 CATCH_UP, RESTART = 1, 2
 CALM = 0.8  # β above which the robot counts as recovered
 HELD = 0.5  # β below which the motion restarts, with `restart`
-# what is remembered of a motion: its time [s], ṡ, s̈ [1/s], when the last tick was [s], 1 while it
-# goes back
-TIME, RATE, CHANGE, CLOCK, BACK = range(5)
 
 
 @dataclass(frozen=True)
@@ -47,9 +45,9 @@ class Tempo:
     fastest: float = field(default=1.25, metadata={"min": 1.0, "max": 10.0})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Pace(Block):
-    """A tempo as compiled code reads it, and what is remembered of the motion."""
+    """A tempo as compiled code reads it, and the state of the motion."""
 
     waits: bool
     distance: float  # [m]
@@ -57,12 +55,16 @@ class Pace(Block):
     least: float
     after: int  # index of `AFTER`
     fastest: float
-    memory: Annotated[np.ndarray, 5]  # TIME, RATE, CHANGE, CLOCK, BACK
+    time: Mutable[float]  # of the motion [s]
+    rate: Mutable[float]  # ṡ
+    change: Mutable[float]  # s̈ [1/s]
+    clock: Mutable[float]  # of the last tick [s]
+    back: Mutable[int]  # 1 while it goes back
 
     def clear(self) -> None:
         """Begin the motion."""
-        self.memory[:] = 0.0
-        self.memory[RATE] = 1.0
+        super().clear()
+        self.rate = 1.0
 
 
 def make_pace(tempo: Tempo, height: float) -> Pace:
@@ -79,23 +81,21 @@ def motion_time_of(p: Pace, s: StateArrays, com_ref: np.ndarray, begin: float, n
 
     `com_ref` (3,) is where the CoM was to be then [m], `begin` [s] the motion's first time.
     """
-    m = p.memory
-    dt = now - m[CLOCK]
+    dt = now - p.clock
     if not p.waits or dt <= 0.0:
-        return now if not p.waits else m[TIME]
-    rate = m[RATE] + min(dt / p.lag, 1.0) * (_wanted(p, s, com_ref, begin) - m[RATE])
-    m[CLOCK] = now
-    m[CHANGE] = (rate - m[RATE]) / dt
-    m[RATE] = rate
-    m[TIME] = max(m[TIME] + rate * dt, begin)
-    return m[TIME]
+        return now if not p.waits else p.time
+    rate = p.rate + min(dt / p.lag, 1.0) * (_wanted(p, s, com_ref, begin) - p.rate)
+    p.clock = now
+    p.change = (rate - p.rate) / dt
+    p.rate = rate
+    p.time = max(p.time + rate * dt, begin)
+    return p.time
 
 
 @compiled
 def _wanted(p: Pace, s: StateArrays, com_ref: np.ndarray, begin: float) -> float:
     """The rate that is aimed at."""
-    m = p.memory
-    late = m[CLOCK] - m[TIME]
+    late = p.clock - p.time
     x, y = s.com[0] - com_ref[0], s.com[1] - com_ref[1]
     beta, least = np.exp(-(x * x + y * y) / (p.distance * p.distance)), p.least
     for i in range(s.contacts.shape[0]):
@@ -104,11 +104,11 @@ def _wanted(p: Pace, s: StateArrays, com_ref: np.ndarray, begin: float) -> float
     if beta > CALM and p.after == CATCH_UP and late > 0.0:
         return min(p.fastest, 1.0 + late)
     if p.after == RESTART:
-        if m[TIME] <= begin:
-            m[BACK] = 0.0
+        if p.time <= begin:
+            p.back = 0
         elif beta < HELD:
-            m[BACK] = 1.0
-        if m[BACK] > 0.0 and beta > CALM:
+            p.back = 1
+        if p.back and beta > CALM:
             return -1.0
     return max(beta, least)
 
@@ -118,7 +118,7 @@ def slow_down(p: Pace, samples: np.ndarray) -> None:
     """Velocities and accelerations of a motion (3, n) by its time as those by the clock."""
     if not p.waits:
         return
-    rate, change = p.memory[RATE], p.memory[CHANGE]
+    rate, change = p.rate, p.change
     for j in range(samples.shape[1]):
         samples[2, j] = rate * rate * samples[2, j] + change * samples[1, j]
         samples[1, j] *= rate

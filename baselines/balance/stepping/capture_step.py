@@ -1,11 +1,11 @@
 """Balance with feet fixed while this suffices; then steps to where the capture point can stop."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from poise.baselines.balance.references.targets import no_offsets
 from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
@@ -21,8 +21,8 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .controller import STANDING, StepOffsets, Stepping, SteppingController
-from .planning.blocks import CaptureTick, Search, StepGains, StepMemory
+from .controller import STANDING, Stepping, SteppingController
+from .planning.blocks import LEG_NUMBERS, CaptureTick, Search, StepGains, StepMemory
 from .planning.config import CaptureStepConfig, StepLimits
 from .planning.cop_region import CopRegion, cop_region, rest_ahead
 from .planning.feedback import feedback_arrays
@@ -100,7 +100,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self.region = cop_region(robot, self.config.region_fraction)
         c = self.config
         self._step_limits = possible_limits(robot, c.limits, c.swing, c.step_qp.torque.share)
-        self.offsets = StepOffsets()  #: what a policy adds
+        self.offsets = no_offsets()  #: what a policy adds
         self.feedback = feedback_arrays(robot, c.feedback, c.falls, c.pivot)
         self._swing = swing_at(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)
@@ -108,7 +108,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         #: (nv−6,) of the last tick [N·m]
         self.tau = guarded_zeros(len(self.qp.parameters.torque_limit))
         self._vdot = guarded_zeros(robot.model.nv)
-        self._failures = guarded_zeros(1, dtype=np.int64)
+        self._failures: Any = guarded_zeros(1, dtype=np.int64)  # of the tick and of the outputs
         self._motors = self.qp.arrays.motor_dofs - 6
         self._reference_out: Targets | None = None
         self._tick: CaptureTick | None = None
@@ -144,9 +144,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         super().reset(state)
         self.sets.reset()
         self.offsets.clear()
-        for array in self.memory.members():
-            array[...] = 0
-        self.memory.foot[0] = -1
+        self.memory.clear()
+        self.memory.foot = -1
         stop_recentring(self.recentring)
         self.memory.level_frame[:] = np.eye(3)
         self._failures[0] = 0
@@ -154,25 +153,25 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     @property
     def steps(self) -> int:
         """The number of steps begun since the reset."""
-        return int(self.memory.steps[0])
+        return self.memory.steps
 
     @property
     def foot(self) -> int:
         """The foot that stepped last; −1: none."""
-        return int(self.memory.foot[0])
+        return self.memory.foot
 
     @property
     def swing(self) -> Swing | None:
         """The swing in progress, or None when both feet are down; ticks write into it."""
-        return self._swing if self.memory.swinging[0] else None
+        return self._swing if self.memory.swinging else None
 
     def stepping(self) -> Stepping:
         """The step in progress, see `Stepping`."""
         swing = self.swing
         if swing is None:
-            return STANDING._replace(steps=self.steps, since=float(self.memory.clock[0]))
+            return STANDING._replace(steps=self.steps, since=self.memory.clock)
         point, foothold = swing.reference[0].copy(), swing.foothold.copy()
-        phase = float(swing.time[0]) / float(swing.duration[0])
+        phase = swing.time / swing.duration
         return Stepping(self.steps, self.foot, point, foothold, phase, time_left(swing), 0.0)
 
     def tick(self, state: RobotState, targets: Targets) -> CaptureTick:
@@ -186,7 +185,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             blocks = self.blocks(state, targets)
             standing = address_of(momentum_tick, blocks.standing)
             contacts = address_of(contact_tick, blocks.on_both)
-            known = self._tick = replace(blocks, standing_kernel=standing, contact_kernel=contacts)
+            known = self._tick = blocks.replace(standing_kernel=standing, contact_kernel=contacts)
         return known
 
     def blocks(self, state: RobotState, targets: Targets) -> CaptureTick:
@@ -194,7 +193,11 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         if self._reference_out is None:
             self._reference_out = Targets.standing(self.robot, state)
         s, asked, region = state.arrays, self._reference_out.arrays(), self.region
-        numbers = in_si(StepGains, self.config, self.robot.units)
+        numbers = in_si(
+            self.config, self.robot.units, *LEG_NUMBERS, "step_margin", "momentum_gain",
+            "turn_limit", "crouch_margin", "restep_margin", "gain", "cop_overreach",
+            "swing_com_drop", "load_time", "unload_time", "double_support_time",
+        )  # fmt: skip
         if self._step_limits is None:
             numbers["step_margin"] = np.inf  # no fall is a reason for a step
         ticks = bind_swings(
@@ -213,7 +216,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             swing=self._swing,
             memory=self.memory,
             recentring=self.recentring,
-            offsets=self.offsets.values,
+            offsets=self.offsets,
             **ticks,
             standing=self.qp.tick(state, targets),
             tau=self.tau,
@@ -230,7 +233,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             return known.search
         return make_search(
             self.robot, s, self.region, self._step_limits or c.limits, c.foothold, self.feedback,
-            self.offsets.values, self.foothold_rule, self._arc,
+            self.offsets, self.foothold_rule, self._arc,
         )  # fmt: skip
 
     def block(self, state: RobotState, targets: Targets) -> Block:

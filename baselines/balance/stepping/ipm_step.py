@@ -27,7 +27,7 @@ def rest_distance(speed: float, omega: float, height: float, arc: float) -> floa
 @compiled
 def energy_foothold(q: Search) -> None:
     """The foothold over which the pendulum stands still and its cost, see `IPMStep`."""
-    s, foot, omega, t = q.state, q.foot[0], q.state.omega[0], q.time[0]
+    s, foot, omega, t = q.state, q.foot, q.state.omega, q.time
     x, vx = pendulum(s.com[0], s.com_vel[0], q.cop[0], omega, t)
     y, vy = pendulum(s.com[1], s.com_vel[1], q.cop[1], omega, t)
     speed = np.sqrt(vx * vx + vy * vy)
@@ -38,7 +38,7 @@ def energy_foothold(q: Search) -> None:
     x, y = with_offsets(q, x, y)
     near_x, near_y = clip_to_limits(q, x, y, q.width_min)
     q.foothold[0], q.foothold[1] = to_world(q, near_x, near_y)
-    q.cost[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
+    q.cost = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
 
 
 class IPMStep(CaptureStep):

@@ -5,7 +5,6 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.targets import TRIGGER
 from poise.baselines.whole_body.compensation import watch
 from poise.baselines.whole_body.tick import ContactTick, go_on_from
 from poise.envs.compiled.calls import call
@@ -13,9 +12,8 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.kinematics import borne_weight
 
-from .planning.blocks import BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, CaptureTick
+from .planning.blocks import CaptureTick
 from .planning.cop_region import distance_beyond, double_support_region, single_support_region
-from .planning.feedback import LATER_STEP, LX, LY
 from .planning.guidance import (
     copy_reference,
     crouch,
@@ -53,8 +51,8 @@ def must_step(t: CaptureTick) -> bool:
 
     `CaptureStepConfig` has the distance."""
     s, m, g, q, feet = t.state, t.memory, t.gains, t.search, t.state.sole_point
-    if m.recovering[0] > 0:
-        if m.clock[0] < g.double_support_time:
+    if m.recovering > 0:
+        if m.clock < g.double_support_time:
             return False
         q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
         set_capture_point(q)
@@ -63,23 +61,23 @@ def must_step(t: CaptureTick) -> bool:
         outside = distance_beyond(
             q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
         )
-        return outside > g.restep_margin + t.offsets[TRIGGER]
+        return outside > g.restep_margin + t.offsets.trigger
     x, y = s.capture_point[0], s.capture_point[1]
     cos, sin = s.heading[0], s.heading[1]
     outside = distance_beyond(
         q.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
     )
     x, y = x - s.origin[0], y - s.origin[1]  # of the fall
-    turning = (x * s.momentum[LY] - y * s.momentum[LX]) / max(np.sqrt(x * x + y * y), 1e-9)
+    turning = (x * s.momentum[4] - y * s.momentum[3]) / max(np.sqrt(x * x + y * y), 1e-9)
     margin = g.step_margin
     if moves(t):
         angle, rate = turned_away(t)
         low = crouch(t)
-        lead = LEAD / s.omega[0] * max(1.0 - low / (DEEP * t.robot.height_com), 0.0)
+        lead = LEAD / s.omega * max(1.0 - low / (DEEP * t.robot.height_com), 0.0)
         if rate > AWAY and angle + lead * rate > g.turn_limit:
             return True
         margin += g.crouch_margin * low * max(1.0 - (angle / g.turn_limit) ** 2, 0.0)
-    return outside + g.momentum_gain * turning > margin + t.offsets[TRIGGER]
+    return outside + g.momentum_gain * turning > margin + t.offsets.trigger
 
 
 @compiled
@@ -87,34 +85,34 @@ def begin_step(t: CaptureTick, to_nominal: bool) -> None:
     """Plan a step that catches the fall, or one back to the nominal stance, and start its swing."""
     s, m, q = t.state, t.memory, t.search
     wrenches = t.on_both.problem.workspace.wrenches
-    if m.steps[0] == 0:
+    if m.steps == 0:
         go_on_from(t.on_both, t.standing.problem.workspace.tau)
         wrenches = t.standing.problem.workspace.wrenches
-    if m.recovering[0] == 0:
+    if m.recovering == 0:
         set_level_frame(m.level_frame, s.heading[0], s.heading[1])
     q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
-    q.feedback.signals[LATER_STEP] = 1.0 if m.recovering[0] > 0 else 0.0
+    q.feedback.signals.later_step = 1.0 if m.recovering > 0 else 0.0
     if to_nominal:
         plan_recentring(q, t.recentring)
     else:
         stop_recentring(t.recentring)
         plan_step(q)
-    foot = q.best_foot[0]
-    m.steps[0] += 1
-    m.recovering[0], m.return_fraction[0] = 1, 0.0
-    m.foot[0], m.swinging[0] = foot, 1
-    start_swing(t.swing, s.sole_point[foot], s.sole_point[1 - foot, 2], q.best[BEST_TIME])
-    aim_swing(t.swing, q.best[BEST_X], q.best[BEST_Y], q.best[BEST_TIME])
-    t.swing.time_offset[0] = q.best[BEST_OFFSET]
-    m.load[0], m.load_fraction[0] = wrenches[6 * foot + FZ], 1.0
+    foot = q.best_foot
+    m.steps += 1
+    m.recovering, m.return_fraction = 1, 0.0
+    m.foot, m.swinging = foot, 1
+    start_swing(t.swing, s.sole_point[foot], s.sole_point[1 - foot, 2], q.best_time)
+    aim_swing(t.swing, q.best_x, q.best_y, q.best_time)
+    t.swing.time_offset = q.best_offset
+    m.load, m.load_fraction = wrenches[6 * foot + FZ], 1.0
 
 
 @compiled
 def has_landed(t: CaptureTick) -> bool:
     """Return whether the foot touches the ground, late in its swing and level."""
-    s, w, foot = t.state, t.swing, t.memory.foot[0]
-    low = s.sole_point[foot, 2] - w.ground[0] < LOW * t.robot.height_com
-    return s.contacts[foot] > 0.5 and w.time[0] > LANDING * w.duration[0] and low
+    s, w, foot = t.state, t.swing, t.memory.foot
+    low = s.sole_point[foot, 2] - w.ground < LOW * t.robot.height_com
+    return s.contacts[foot] > 0.5 and w.time > LANDING * w.duration and low
 
 
 @compiled
@@ -129,8 +127,8 @@ def solve_contacts(t: CaptureTick, contacts: ContactTick) -> None:
 def limit_load(t: CaptureTick, most: float) -> None:
     """Limit the load of the foot that steps [N]; the other one bears what there is."""
     t.on_both.load_limits[0] = t.on_both.load_limits[1] = np.inf
-    t.on_both.load_limits[t.memory.foot[0]] = most
-    t.on_both.limited[0] = 1
+    t.on_both.load_limits[t.memory.foot] = most
+    t.on_both.limited = 1
 
 
 @compiled
@@ -138,32 +136,32 @@ def replan_swing(t: CaptureTick) -> None:
     """Replan the rest of the running step, and guide its foot there."""
     m, w, q, r = t.memory, t.swing, t.search, t.recentring
     q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
-    if r.stage[0] != SWINGING or not replan_recentring(q, r, w):
-        r.stage[0] = INACTIVE
-        replan_step(q, m.foot[0], w)
-    aim_swing(w, q.best[BEST_X], q.best[BEST_Y], w.time[0] + q.best[BEST_TIME])
-    w.time_offset[0] = q.best[BEST_OFFSET]
+    if r.stage != SWINGING or not replan_recentring(q, r, w):
+        r.stage = INACTIVE
+        replan_step(q, m.foot, w)
+    aim_swing(w, q.best_x, q.best_y, w.time + q.best_time)
+    w.time_offset = q.best_offset
 
 
 @compiled
-def swing_tick(t: CaptureTick) -> None:
+def step_tick(t: CaptureTick) -> None:
     """A tick in a step: first the foot gives its load away, then it swings."""
     s, m, g, w, q = t.state, t.memory, t.gains, t.swing, t.search
-    foot, level = m.foot[0], m.level_frame
+    foot, level = m.foot, m.level_frame
     stance = s.sole_point[1 - foot]
     if time_left(w) > FROZEN:
         replan_swing(t)
     n = single_support_region(q.region, 1 - foot, stance, level[0, 0], level[1, 0], t.corners)
     stride_x, stride_y = w.foothold[0] - stance[0], w.foothold[1] - stance[1]
     guide_com(t, t.corners[:n], 0.0, stance[2], stride_x, stride_y)
-    m.load_fraction[0] -= g.period / max(g.unload_time, 1e-9)
-    if m.load_fraction[0] > 0.0:
-        limit_load(t, m.load_fraction[0] * max(m.load[0], 0.0))
+    m.load_fraction -= g.period / max(g.unload_time, 1e-9)
+    if m.load_fraction > 0.0:
+        limit_load(t, m.load_fraction * max(m.load, 0.0))
         solve_contacts(t, t.on_both)
         return
     advance_over(w, w.apex, g.period)
     contacts = t.on_second if foot == 0 else t.on_first
-    contacts.limited[0] = 0
+    contacts.limited = 0
     solve_contacts(t, contacts)
 
 
@@ -171,20 +169,20 @@ def swing_tick(t: CaptureTick) -> None:
 def double_support_tick(t: CaptureTick) -> None:
     """A tick on both feet, wherever they are."""
     m, g, feet, level = t.memory, t.gains, t.state.sole_point, t.memory.level_frame
-    if m.corners[0] == 0:  # feet have just come to rest
-        m.corners[0] = double_support_region(
+    if m.corners == 0:  # feet have just come to rest
+        m.corners = double_support_region(
             t.search.region, feet, level[0, 0], level[1, 0], t.cloud, m.region
         )
     stride_x, stride_y = feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1]
     ground = 0.5 * (feet[0, 2] + feet[1, 2])
-    guide_com(t, m.region[: m.corners[0]], g.cop_overreach, ground, stride_x, stride_y)
-    if m.moved[0]:
+    guide_com(t, m.region[: m.corners], g.cop_overreach, ground, stride_x, stride_y)
+    if m.moved:
         return_to_motion(t)
-    t.on_both.limited[0] = 0
-    if m.clock[0] < g.load_time:
+    t.on_both.limited = 0
+    if m.clock < g.load_time:
         weight = borne_weight(t.robot, t.state)
-        limit_load(t, weight * (FIRST_LOAD + m.clock[0] / g.load_time))
-    m.clock[0] += g.period
+        limit_load(t, weight * (FIRST_LOAD + m.clock / g.load_time))
+    m.clock += g.period
     solve_contacts(t, t.on_both)
 
 
@@ -194,7 +192,7 @@ def standing_tick(t: CaptureTick) -> None:
     call(t.standing_kernel, t.standing)
     copy_into(t.standing.problem.workspace.tau, t.tau)
     copy_into(t.standing.problem.workspace.vdot, t.vdot)
-    t.failures[0] = t.standing.memory.failures[0]
+    t.failures = t.standing.memory.failures
 
 
 @compiled
@@ -203,26 +201,26 @@ def capture_tick(t: CaptureTick) -> None:
     m = t.memory
     if t.standing.compensation.active:
         watch(t.standing.compensation)
-    if not m.moved[0] and moves(t):
-        m.moved[0] = 1
-    if not m.swinging[0]:
+    if not m.moved and moves(t):
+        m.moved = 1
+    if not m.swinging:
         if must_step(t):
             begin_step(t, False)
-        elif m.steps[0] == 0:
+        elif m.steps == 0:
             standing_tick(t)
             return
         elif recentring_step_due(t):
             begin_step(t, True)
     copy_reference(t)
-    if m.swinging[0] and has_landed(t):
-        m.swinging[0], m.clock[0], m.corners[0] = 0, 0.0, 0
+    if m.swinging and has_landed(t):
+        m.swinging, m.clock, m.corners = 0, 0.0, 0
         end_recentring_swing(t.recentring)
-    if not m.swinging[0] and t.recentring.homing[0]:
+    if not m.swinging and t.recentring.homing:
         foot = slipped_foot(t)
         if foot >= 0:
             lower_foot(t, foot)
-    if m.swinging[0]:
-        swing_tick(t)
+    if m.swinging:
+        step_tick(t)
     else:
         double_support_tick(t)
-    t.failures[0] = t.standing.memory.failures[0] + t.on_both.memory.failures[0]
+    t.failures = t.standing.memory.failures + t.on_both.memory.failures

@@ -11,9 +11,6 @@ import numpy as np
 
 from poise.baselines.controller import BaseController, Controller
 from poise.baselines.environments.hand_over import (
-    AUTHORITY,
-    CALM,
-    OPEN,
     HandOver,
     WholeStep,
     is_calm,
@@ -27,22 +24,22 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.callbacks import call_back
 from poise.envs.compiled.calls import CompiledStep, address_of
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.kinematics import support_distance, update_support
 
 from .config import GuardConfig
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Guard(Block):
     """The limits beyond which the guard takes over, and how often it did."""
 
     margin: float  # [m]
     cos_tilt: float
-    count: np.ndarray  # (1,) int: of the episode
+    count: Mutable[int]  # in the episode
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class GuardStep(Block):
     """All that a policy step works on."""
 
@@ -63,24 +60,24 @@ def is_off(g: Guard, step: PolicyStep) -> bool:
 def set_guard(g: Guard, h: HandOver, step: PolicyStep):
     """Take over, or hand back to the walker, which restarts."""
     a, m = step.inputs, h.memory
-    if m[OPEN] == 0.0:
+    if not m.open:
         if is_off(g, step):
-            m[OPEN], m[CALM] = 1.0, 0.0
-            g.count[0] += 1
+            m.open, m.calm = 1, 0.0
+            g.count += 1
     else:
         distance = capture_error(a.state, a.motion, a.com_offset)
-        m[CALM] = m[CALM] + 1.0 if is_calm(h, step, distance) else 0.0
-        if m[CALM] >= h.calm_steps:
-            m[OPEN] = 0.0
+        m.calm = m.calm + 1.0 if is_calm(h, step, distance) else 0.0
+        if m.calm >= h.calm_steps:
+            m.open = 0
             call_back(h.begin)
-    m[AUTHORITY] = m[OPEN]
+    m.authority = m.open
 
 
 @compiled
 def guard_tick(step: GuardStep):
     """A control tick of the walker, or one of the recovery policy's servos alone."""
     base = step.whole.base
-    if base.episode.ticks[0] == 0:
+    if base.episode.ticks == 0:
         set_guard(step.guard, step.whole.hand, base)
     shared_tick(step.whole)
 
@@ -104,7 +101,7 @@ class GuardedEnv(ResidualWholeEnv):
 
     def __init__(self, *arguments: Any, guard: GuardConfig, **named: Any):
         self.guard = guard
-        self._guard = Guard(guard.margin, float(np.cos(guard.tilt)), guarded_zeros(1, np.int64))
+        self._guard = Guard(guard.margin, float(np.cos(guard.tilt)), 0)
         super().__init__(*arguments, **named)
 
     def _accept(self, controller: Controller, base: BaseController) -> None:
@@ -115,7 +112,7 @@ class GuardedEnv(ResidualWholeEnv):
     @property
     def takeovers(self) -> int:
         """How often the guard took over in this episode."""
-        return int(self._guard.count[0])
+        return self._guard.count
 
     def use_raw(self, raw: bool) -> None:
         """Estimate the state, also for a walker that takes raw measurements."""
@@ -126,7 +123,7 @@ class GuardedEnv(ResidualWholeEnv):
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         super()._begin(options)
-        self._guard.count[0] = 0
+        self._guard.count = 0
 
     def _restart_controller(self) -> None:
         """The walker's new beginning, with the command that holds now."""

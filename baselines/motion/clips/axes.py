@@ -48,7 +48,7 @@ class FileAxes:
         return nearest_axis(self.matrix[2]), nearest_axis(self.matrix[0])
 
 
-def axes_of(up: str, forward: str, unit: float = 1.0, source: str | None = None) -> FileAxes:
+def named_axes(up: str, forward: str, unit: float = 1.0, source: str | None = None) -> FileAxes:
     """The axes of a file whose `up` and `forward` are named, such as ``y`` and ``z``.
 
     Raises:

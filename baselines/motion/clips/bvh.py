@@ -13,7 +13,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.extras import needing
 from poise.configs.files import write_atomic
 
-from .axes import FileAxes, axes_of, named_unit, nearest_axis, unit_from_legs
+from .axes import FileAxes, named_axes, named_unit, nearest_axis, unit_from_legs
 from .bvh_pose import rigid, rooted_at_hips, unrooted
 from .bvh_text import read_bvh_text
 from .clip import Clip
@@ -22,7 +22,7 @@ from .rotations import to_scipy
 from .skeleton import Skeleton
 
 ALONE = 4.0  # times the largest move between frames: that of a first frame that is the rest pose
-Y_UP = axes_of("y", "z")  # what most programs write
+Y_UP = named_axes("y", "z")  # what most programs write
 LEGS = tuple(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in SIDES)
 
 
@@ -186,8 +186,8 @@ def _axes(
     if forward == "auto":
         across = raw.rest[roles["hip_left"]] - raw.rest[roles["hip_right"]]
         any_forward = "x" if up[-1] != "x" else "y"
-        forward = nearest_axis(np.cross(across, axes_of(up, any_forward).matrix[2]))
-    return axes_of(up, forward, length, source)
+        forward = nearest_axis(np.cross(across, named_axes(up, any_forward).matrix[2]))
+    return named_axes(up, forward, length, source)
 
 
 def _middle(pose: np.ndarray, roles: dict[str, int], joint: str) -> np.ndarray:

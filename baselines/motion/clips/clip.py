@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from poise.configs.errors import ConfigError
+from poise.configs.problems import out_of_range
 from poise.envs.compiled.maths.easing import ease
 
 from .rotations import IDENTITY, about_z, heading_angle, inverse, multiply, rotate, slerp
@@ -197,7 +198,7 @@ class Clip:
         `closed` before, or ends as it begins.
         """
         if count < 1:
-            raise ConfigError(f"must be at least 1, not {count}", source=self.name, field="loop")
+            raise out_of_range(count, source=self.name, field="loop", least=1)
         _frames(count * (len(self) - 1.0) + 1.0, self.name, "loop")
         parts, turned = [self], self.facing() if count > 1 else np.zeros(1)
         for _ in range(count - 1):
@@ -226,5 +227,5 @@ def _frames(count: float, source: str, field: str) -> int:
 
 def _positive(value: float, source: str, field: str) -> float:
     if not 0.0 < value < np.inf:
-        raise ConfigError(f"must be above 0, not {value:g}", source=source, field=field)
+        raise out_of_range(value, source=source, field=field, above=0, form="g")
     return value

@@ -20,6 +20,7 @@ STEADY = 0.12  # [s] shorter changes are noise
 BELT, STAYS = 0.3, 0.25  # [m/s] least speed of a treadmill; of its way by which hips may move on it
 FLOOR = 2.0  # percentile of the lowest points that is the floor: noise goes below it
 IN_PLACE = 0.12  # [m] a planted foot may wander in the capture
+HOP = 0.1  # [s] without a planted foot: what is shorter throughout is no jump
 
 
 class Contacts(NamedTuple):
@@ -87,6 +88,22 @@ def longest_flight(planted: np.ndarray, dt: float) -> tuple[int, float]:
     flights = [(after - first, first) for first, after in runs_of(in_air).tolist()]
     frames, first = max(flights, key=lambda flight: flight[0], default=(0, 0))
     return first, frames * dt
+
+
+def grounded(planted: np.ndarray, dt: float) -> np.ndarray:
+    """(F, 2) planted feet without flights, where none of these lasts 0.1 s, as in many dances.
+
+    The feet that lifted off last stay down until the next one lands; at the begin those that land.
+    Of more flights than half of the steps nothing is taken: that is a run.
+    """
+    flights = runs_of(np.asarray(~planted.any(axis=1))).tolist()
+    steps = int(np.sum(np.diff(planted.astype(int), axis=0) > 0))
+    if longest_flight(planted, dt)[1] >= HOP or len(flights) > 0.5 * steps:
+        return planted
+    down = planted.copy()
+    for first, after in flights:
+        down[first:after] = down[first - 1] if first else down[min(after, len(down) - 1)]
+    return down
 
 
 def over_ground(clip: Clip) -> Clip:

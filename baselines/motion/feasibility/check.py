@@ -11,7 +11,7 @@ from poise.envs.compiled.maths.polygons import half_planes
 from poise.envs.robots.ground import contact_friction
 from poise.envs.robots.robot import Robot
 
-from .split import motor_torques
+from .split import joint_motor_torques
 from .stepped import margins, sample_stepped
 from .trajectory import Joints, PlantedRobot, Trajectory, joints_of, sample_trajectory
 
@@ -206,7 +206,7 @@ def judge(
         margin, drift = margins(robot, trajectory)
     joints = trajectory.qpos[:, 7:]
     excess = np.maximum(robot.joint_range[:, 0] - joints, joints - robot.joint_range[:, 1])
-    torque = motor_torques(robot, trajectory) / np.asarray(robot.torque_limit)
+    torque = joint_motor_torques(robot, trajectory) / np.asarray(robot.torque_limit)
     return Feasibility(
         limits=limits or FeasibilityLimits(),
         times=trajectory.times,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from poise.baselines.motion.graphs.joining.states import quintic
+from poise.baselines.motion.graphs.joining.states import quintic_rise
 
 from .check import Feasibility
 
@@ -50,7 +50,7 @@ class Curve(NamedTuple):
         """The curve without bends."""
         D, gap = duration, b.place - a.place
         bends = D**2 * a.acceleration, D**2 * b.acceleration
-        coefficients = quintic(gap, D * a.rate, D * b.rate, *bends)
+        coefficients = quintic_rise(gap, D * a.rate, D * b.rate, *bends)
         coefficients[0] = a.place
         return cls(coefficients, np.zeros((len(KNOTS), len(gap))), duration)
 
@@ -120,7 +120,7 @@ class JoinPart:
         return not np.any(self.curve.coefficients[2])
 
 
-class Refused(NamedTuple):
+class WhyNot(NamedTuple):
     """Why a duration is not possible, and how far it is from that, see `Feasibility.lacking`."""
 
     reason: str

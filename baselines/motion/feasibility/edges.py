@@ -15,7 +15,7 @@ SAMPLED = ("times", "zmp", "zmp_margin", "reach", "friction", "load", "torque", 
 MORE = 1.05  # times as bad, since splines through other frames differ a little
 
 
-def eased(own: Feasibility) -> FeasibilityLimits:
+def clip_limits(own: Feasibility) -> FeasibilityLimits:
     """The limits, or what a clip itself takes where that is worse."""
     c = own.limits
     return replace(
@@ -30,14 +30,14 @@ def eased(own: Feasibility) -> FeasibilityLimits:
 
 
 def faded(own: Feasibility, share: float) -> FeasibilityLimits:
-    """Limits of which `share` are those of `eased`, and the rest the limits themselves."""
-    hard, soft = own.limits, eased(own)
+    """Limits of which `share` are those of `clip_limits`, and the rest the limits themselves."""
+    hard, soft = own.limits, clip_limits(own)
     values = {field.name: _between(getattr(hard, field.name), getattr(soft, field.name), share)
               for field in fields(hard)}  # fmt: skip
     return FeasibilityLimits(**values)
 
 
-def part(judged: Feasibility, kept: np.ndarray, limits: FeasibilityLimits) -> Feasibility:
+def masked(judged: Feasibility, kept: np.ndarray, limits: FeasibilityLimits) -> Feasibility:
     """The samples of a mask (n,), against other limits."""
     samples = [name for name in SAMPLED if getattr(judged, name) is not None]
     cut: dict[str, Any] = {name: getattr(judged, name)[kept] for name in samples}
@@ -59,7 +59,7 @@ def between_clips(judged: Feasibility, before: Feasibility, after: Feasibility) 
     for own, number in ((before, 0), (after, 1)):
         for value in np.unique(share[side == number]):
             limits = faded(own, float(value)) if value > 0.0 else judged.limits
-            one = part(judged, (side == number) & (share == value), limits)
+            one = masked(judged, (side == number) & (share == value), limits)
             if not one.feasible:
                 return one.reason
     return ""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
-from poise.baselines.balance.references.targets import motion_arrays, update_targets
+from poise.baselines.balance.references.targets import motion_arrays, no_offsets, update_targets
 from poise.baselines.controller import Targets
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP
@@ -14,8 +14,6 @@ from poise.envs.robots.robot import Robot
 
 from .check import Feasibility
 from .trajectory import PlantedRobot
-
-RESIDUALS = 9  # entries of a residual, all of them 0 here
 
 
 def with_gap(
@@ -36,7 +34,7 @@ def with_gap(
         raise ConfigError("is not for motions with steps: this QP keeps both soles planted",
                           source=motion.name, field="qp")  # fmt: skip
     planted, qp = PlantedRobot(robot), MomentumQP(robot, config)
-    block, none = motion_arrays(motion), np.zeros(RESIDUALS)
+    block, none = motion_arrays(motion), no_offsets()
     gaps = np.empty(len(judged.times))
     for k, time in enumerate(judged.times):
         vdot = planted.at(*motion.sample(time)[:3])

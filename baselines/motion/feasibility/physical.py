@@ -15,7 +15,7 @@ from poise.envs.robots.robot import Robot
 
 from .apart import check_rates, in_one, stretch_at
 from .check import FeasibilityLimits
-from .curve import Curve, End, JoinPart, Refused
+from .curve import Curve, End, JoinPart, WhyNot
 from .shape import Shaper
 from .trajectory import PlantedRobot
 
@@ -141,14 +141,14 @@ def height_span(motions: Sequence[ReferenceMotion]) -> tuple[float, float]:
     return min(heights) - LOWER, max(heights) + HIGHER
 
 
-def cheapest(shaper: Shaper, a: End, b: End) -> JoinPart | Refused:
+def cheapest(shaper: Shaper, a: End, b: End) -> JoinPart | WhyNot:
     """The possible way of least K + λ D; if none is, the duration that lacks least."""
-    best, nearest, least = None, Refused(""), np.inf
+    best, nearest, least = None, WhyNot(""), np.inf
     for bound, count in sorted(_prices(shaper, a, b)):
         if bound >= least:
             break  # bends only add to K
         tried = shaper.attempt(a, b, count)
-        if isinstance(tried, Refused):
+        if isinstance(tried, WhyNot):
             nearest = tried if not nearest.reason or tried.lacking < nearest.lacking else nearest
             continue
         price = tried.coefficient + shaper.time_price * tried.duration
@@ -187,10 +187,10 @@ def way_between(shaper: Shaper, a: End, b: End, through: bool) -> tuple[JoinPart
     return f"{direct.reason}; {ways}" if isinstance(ways, str) else ways
 
 
-def direct_way(shaper: Shaper, a: End, b: End) -> JoinPart | Refused:
+def direct_way(shaper: Shaper, a: End, b: End) -> JoinPart | WhyNot:
     """The cheapest way from one end to the other, without the clips' accelerations if need be."""
     direct = cheapest(shaper, a, b)
-    if isinstance(direct, Refused) and not (a.is_calm and b.is_calm):
+    if isinstance(direct, WhyNot) and not (a.is_calm and b.is_calm):
         # a clip may be about to do what leads to nothing
         calm = cheapest(shaper, a.calm, b.calm)
         direct = calm if isinstance(calm, JoinPart) else direct
@@ -202,7 +202,7 @@ def ways_by_standing(shaper: Shaper, a: End, b: End) -> tuple[JoinPart, ...] | s
     standing, ways = standing_end(shaper), []
     for word, (start, goal) in zip(("to", "from"), pairwise((a, standing, b)), strict=True):
         way = cheapest(shaper, start, goal)
-        if isinstance(way, Refused):
+        if isinstance(way, WhyNot):
             return f"{word} standing: {way.reason}"
         ways.append(way)
     return tuple(ways)

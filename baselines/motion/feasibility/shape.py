@@ -11,7 +11,7 @@ from poise.baselines.solvers import QP, make_solver
 from poise.envs.compiled.maths.polygons import half_planes
 
 from .check import Feasibility, FeasibilityLimits, check_joints, judge
-from .curve import Boundary, Curve, End, JoinPart, Refused, bend_shapes, jerk_matrix
+from .curve import Boundary, Curve, End, JoinPart, WhyNot, bend_shapes, jerk_matrix
 from .edges import EDGE, between_clips
 from .split import bearable_region
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
@@ -61,17 +61,17 @@ class Shaper:
         own = check_joints(self.planted, joints_of(motion), times, self.limits)
         return End(frames, s.q_ref, state, region, own)
 
-    def attempt(self, a: End, b: End, count: int) -> JoinPart | Refused:
+    def attempt(self, a: End, b: End, count: int) -> JoinPart | WhyNot:
         """The join that lasts `count` frames."""
         curve = Curve.between(a.boundary, b.boundary, count * self.dt)
         bends, stuck = self._bent_joints(curve)
         if stuck:
-            return Refused(stuck)
+            return WhyNot(stuck)
         curve = curve._replace(bends=bends)
         for _ in range(ROUNDS):
             qpos, slopes = self.frames(curve, a, count)
             if qpos is None:
-                return Refused("the legs cannot reach the ground")
+                return WhyNot("the legs cannot reach the ground")
             judged, path = self._judged(a, b, qpos, COARSE)
             reason = between_clips(judged, a.own, b.own)
             if not reason:
@@ -85,7 +85,7 @@ class Shaper:
             bends = curve.bends.copy()
             bends[:, :MOVED] += step
             curve = curve._replace(bends=bends)
-        return Refused(reason, judged.lacking)
+        return WhyNot(reason, judged.lacking)
 
     def _bent_joints(self, curve: Curve) -> tuple[np.ndarray, str]:
         """Least bends (3, n) that keep the joints in range, each by itself; or what cannot."""

@@ -32,14 +32,14 @@ def split_wrench(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     size = np.concatenate([np.append(np.ones(3), _lever(sole.polygon)) for sole in robot.soles])
     H = B.transpose(0, 2, 1) @ B + SUM * G.transpose(0, 2, 1) @ G + np.diag(LEAST / size**2)
     g = -np.einsum("kmi,km->ki", B, b) - SUM * np.einsum("kji,kj->ki", G, wanted)
-    cones = sole_cones(robot, trajectory)
+    cones = world_cones(robot, trajectory)
     below = np.full(cones.shape[1], -np.inf), np.zeros(cones.shape[1])
     solver = make_solver("active-set")
     solved = [solver.solve(QP(H[k], g[k], cones[k], *below)).x for k in range(len(H))]
     return unit * np.array(solved).reshape(len(H), -1) * bears
 
 
-def motor_torques(robot: Robot, trajectory: Trajectory) -> np.ndarray:
+def joint_motor_torques(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     """(n, nu) torques [N·m] of the motors: τ = M v̇ + h − Jᵀ w in their rows."""
     wrenches = split_wrench(robot, trajectory)
     borne = np.einsum("kwv,kw->kv", trajectory.jacobians, wrenches)
@@ -56,7 +56,7 @@ def wrench_sums(trajectory: Trajectory) -> np.ndarray:
     return G
 
 
-def sole_cones(robot: Robot, trajectory: Trajectory) -> np.ndarray:
+def world_cones(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     """(n, r, 6 nc) rows of the soles' cones for wrenches in world axes."""
     cones, samples = robot_cones(robot, 1.0, 1.0), len(trajectory.times)
     count, rows = cones.shape[:2]
@@ -102,7 +102,7 @@ def bearable_region(
     robot, still = planted.robot, np.zeros_like(q)
     t = sample_trajectory(planted, lambda _: (q, still, still), np.zeros(1))
     unit, limit = robot.units.force, share * np.asarray(robot.torque_limit)
-    sums, cones = wrench_sums(t)[0], sole_cones(robot, t)[0]
+    sums, cones = wrench_sums(t)[0], world_cones(robot, t)[0]
     borne = unit * t.jacobians[0][:, robot.motor_dofs].T / limit[:, None]
     held = load * t.motors[0] / limit
     rows = np.vstack([cones, -borne, borne])

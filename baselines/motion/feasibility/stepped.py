@@ -7,7 +7,7 @@ from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.envs.compiled.maths.polygons import convex_hull, half_planes
 from poise.envs.robots.robot import Robot
 
-from .trajectory import PlantedRobot, Trajectory, record
+from .trajectory import PlantedRobot, Trajectory, record_robot
 
 SMALL = 1e-3  # [s] of the differences that velocities and accelerations are
 
@@ -43,7 +43,7 @@ def sample_stepped(planted: PlantedRobot, motion: ReferenceMotion, times: np.nda
         return (ahead - back) / SMALL
 
     down = np.array([footing.sample(time).planted for time in times])
-    return record(planted, times, put)._replace(planted=down)
+    return record_robot(planted, times, put)._replace(planted=down)
 
 
 def margins(robot: Robot, path: Trajectory) -> tuple[np.ndarray, np.ndarray]:

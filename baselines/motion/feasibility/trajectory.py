@@ -154,10 +154,10 @@ class PlantedRobot:
 
 def sample_trajectory(planted: PlantedRobot, joints: Joints, times: np.ndarray) -> Trajectory:
     """The whole robot at `times` (n,) [s] of a motion of its joints."""
-    return record(planted, times, lambda time: planted.at(*joints(time)))
+    return record_robot(planted, times, lambda time: planted.at(*joints(time)))
 
 
-def record(
+def record_robot(
     planted: PlantedRobot, times: np.ndarray, put: Callable[[float], np.ndarray]
 ) -> Trajectory:
     """The whole robot at `times` (n,) [s]: `put` puts it there, and returns its v̇ (nv,)."""

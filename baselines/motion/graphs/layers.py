@@ -19,7 +19,7 @@ from poise.configs.errors import ConfigError
 from .k_best import k_best
 from .moments import Moments
 from .motion_graph import MotionGraph, Transition, earliest_part, latest_part
-from .paths import Path, Step, Task
+from .paths import Path, PathTask, Step
 
 SHORT = 1e-6  # of the price of time: of two ways that cost the same the shorter one is taken
 OFFSET = 1.0  # of the edges out of the start, as a sparse graph has no edges of 0
@@ -28,7 +28,7 @@ OFFSET = 1.0  # of the edges out of the start, as a sparse graph has no edges of
 class Layers:
     """The layered graph of a task; node = layer · moments + moment, then start and end."""
 
-    def __init__(self, graph: MotionGraph, task: Task):
+    def __init__(self, graph: MotionGraph, task: PathTask):
         self.task, self.graph = task, graph
         self.moments = Moments(graph, [*task.start, *task.goal])
         self.size = len(self.moments)

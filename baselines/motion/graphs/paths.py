@@ -10,7 +10,7 @@ Place = tuple[str, float]  # a clip and a time in it [s]
 
 
 @dataclass(frozen=True)
-class Task:
+class PathTask:
     """What a path must do.
 
     Attributes:

@@ -3,17 +3,18 @@
 from collections.abc import Callable
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.problems import out_of_range
 
 from .layers import Layers
 from .motion_graph import MotionGraph, Transition, transition_order
-from .paths import Path, Task
+from .paths import Path, PathTask
 
 CHECKS = 200  # of the best path, before the search gives up
 
 
 def best_paths(
     graph: MotionGraph,
-    task: Task,
+    task: PathTask,
     k: int = 1,
     check: Callable[[Transition], str] | None = None,
 ) -> list[Path]:
@@ -52,9 +53,9 @@ def best_paths(
                       "one", source="graph")  # fmt: skip
 
 
-def _check(graph: MotionGraph, task: Task, k: int) -> None:
+def _check(graph: MotionGraph, task: PathTask, k: int) -> None:
     if k < 1:
-        raise ConfigError(f"must be at least 1, not {k}", field="k")
+        raise out_of_range(k, field="k", least=1)
     if not task.actions:
         raise ConfigError("a path needs an action", field="actions", choices=graph.names)
     for name in (*task.actions, *(name for name, _ in (*task.start, *task.goal))):

@@ -10,16 +10,14 @@ from poise.baselines.balance.references.tempo import Pace
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick
 from poise.baselines.balance.stepping.planning.units import in_si
 from poise.baselines.controller import TargetArrays
-from poise.envs.compiled.block import Block, Integer, Number
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.maths.pendulum import Units
+from poise.envs.compiled.mutable import Mutable
 
 from .config import PerformConfig
 
-#: of `Performance.frame`: where the motion's own frame is in the world, its ground and its heading
-X, Y, GROUND, COS, SIN = range(5)
 
-
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Performance(Block):
     """A `Footing` as compiled code reads it, gains, and how far the performance is."""
 
@@ -37,30 +35,38 @@ class Performance(Block):
     load_time: float  # [s]
     unload_time: float  # [s]
     landing_speed: float  # [m/s] of a foot that is late
-    clock: Number  # since the reset [s]
-    performing: Integer  # 1 while it follows the schedule; 0: it catches itself
-    begun: Integer  # the phase whose foot lifted off last; 0: none did
-    flying: Integer  # 1 during flight
-    rested: Number  # since both feet are down and the motion is left [s]
-    left: Integer  # how often the planner of steps took over
-    frame: Annotated[np.ndarray, 5]  # see X to SIN
+    clock: Mutable[float]  # since the reset [s]
+    performing: Mutable[int]  # 1 while it follows the schedule; 0: it catches itself
+    begun: Mutable[int]  # the phase whose foot lifted off last; 0: none did
+    flying: Mutable[int]  # 1 during flight
+    rested: Mutable[float]  # since both feet are down and the motion is left [s]
+    left: Mutable[int]  # how often the planner of steps took over
+    x: Mutable[float]  # of the motion's own frame in the world [m]
+    y: Mutable[float]
+    floor: Mutable[float]  # height of its ground [m]
+    cos: Mutable[float]  # of its heading
+    sin: Mutable[float]
 
     def clear(self) -> None:
         """Before the motion begins."""
-        for array in (self.clock, self.begun, self.flying, self.rested, self.left):
-            array[0] = 0
-        self.performing[0] = 1
+        self.clock, self.rested = 0.0, 0.0
+        self.begun, self.flying, self.left = 0, 0, 0
+        self.performing = 1
 
 
 def allocate_performance(
     footing: Footing, pace: Pace, config: PerformConfig, units: Units
 ) -> Performance:
     """The performance of a motion by a robot with these units, before it begins."""
+    numbers = in_si(
+        config, units, "gain", "margin", "margin_both", "rest_time", "stance_error", "load_time",
+        "unload_time",
+    )  # fmt: skip
     made = Performance.allocate(
         knots=footing.knots, coeffs=footing.coeffs, switches=footing.switches,
         planted=footing.planted, pace=pace,
-        **in_si(Performance, config, units),
-        **in_si(Performance, config.swing, units),
+        **numbers,
+        **in_si(config.swing, units, "landing_speed"),
     )  # fmt: skip
     made.clear()
     return made

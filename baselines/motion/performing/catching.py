@@ -14,7 +14,7 @@ from .schedule import (
     put_frame,
     reached_region,
     stance_differs,
-    to_world,
+    turn_to_world,
 )
 
 AHEAD = 0.4  # [s] before a lift-off by which the motion must have gone on
@@ -24,16 +24,16 @@ AHEAD = 0.4  # [s] before a lift-off by which the motion must have gone on
 def leave(t: PerformTick) -> None:
     """Hand over to the planner of steps, in the middle of a swing too."""
     c, p, m, w = t.capture, t.performance, t.own.memory, t.own.swing
-    p.performing[0], p.rested[0] = 0, 0.0
-    p.left[0] += 1
+    p.performing, p.rested = 0, 0.0
+    p.left += 1
     stop_recentring(c.recentring)
-    m.recovering[0], m.corners[0], m.return_fraction[0] = 0, 0, 0.0
+    m.recovering, m.corners, m.return_fraction = 0, 0, 0.0
     go_on_from(c.on_both, t.own.on_both.applied)
-    if m.swinging[0]:
-        m.recovering[0], m.load_fraction[0] = 1, 0.0
-        w.time[0], w.time_offset[0] = 0.0, 0.0
-        w.duration[0] = c.search.time_max
-    elif m.steps[0] == 0:
+    if m.swinging:
+        m.recovering, m.load_fraction = 1, 0.0
+        w.time, w.time_offset = 0.0, 0.0
+        w.duration = c.search.time_max
+    elif m.steps == 0:
         ws = c.standing.problem.workspace
         copy_into(t.own.on_both.applied, ws.tau)
         copy_into(t.own.on_both.problem.workspace.wrenches, ws.wrenches)
@@ -43,13 +43,13 @@ def leave(t: PerformTick) -> None:
 def may_go_on(t: PerformTick, time: float) -> bool:
     """Return whether the motion can go on from here; then its frame is put under it."""
     p, m, period = t.performance, t.own.memory, t.own.gains.period
-    p.rested[0] = 0.0 if m.swinging[0] or m.recovering[0] else p.rested[0] + period
-    if p.rested[0] < p.rest_time or lifted_foot(t, phase_at(p.switches, time)) >= 0:
+    p.rested = 0.0 if m.swinging or m.recovering else p.rested + period
+    if p.rested < p.rest_time or lifted_foot(t, phase_at(p.switches, time)) >= 0:
         return False
     if next_switch(t, time) - time < AHEAD or stance_differs(t):
         return False
     put_frame(t)
-    to_world(t)
+    turn_to_world(t)
     return beyond_reach(t, reached_region(t)) <= 0.0
 
 
@@ -57,9 +57,9 @@ def may_go_on(t: PerformTick, time: float) -> bool:
 def go_on(t: PerformTick) -> None:
     """Perform again, from the stance that the planner has reached."""
     c, p, m = t.capture, t.performance, t.own.memory
-    before = c.standing.problem.workspace.tau if m.steps[0] == 0 else c.on_both.applied
+    before = c.standing.problem.workspace.tau if m.steps == 0 else c.on_both.applied
     go_on_from(t.own.on_both, before)
-    p.performing[0], m.corners[0] = 1, 0
+    p.performing, m.corners = 1, 0
     stop_recentring(c.recentring)
 
 

@@ -1,7 +1,5 @@
 """`feedback-step` that performs motions whose feet leave the ground."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from poise.baselines.balance.references.legs import PlantedLegs
@@ -16,12 +14,21 @@ from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.warmup import fill_cache
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .blocks import Performance, PerformTick, allocate_performance
 from .config import MotionStepConfig
 from .tick import perform_tick
+
+KERNELS = "poise.baselines.motion.kernels"
+
+
+def warm_up() -> None:
+    """Fill the cache of compiled kernels of this controller if it is cold, see `prepare`."""
+    prepare("contacts", "planner")
+    fill_cache(KERNELS, {"performing": "motions with steps"}, ("performing",))
 
 
 class MotionStep(CaptureStep):
@@ -35,7 +42,7 @@ class MotionStep(CaptureStep):
 
     def __init__(self, robot: Robot, config: MotionStepConfig | None = None):
         config = config or MotionStepConfig()
-        prepare("contacts", "planner", "performing")
+        warm_up()
         check_qps(config, {"perform.qp": config.perform.qp})
         self.perform_sets = ContactSets(
             robot, config.perform.qp, config.perform.torque_rate_limit
@@ -96,13 +103,12 @@ class MotionStep(CaptureStep):
             self.perform_sets, capture.state, capture.reference_out, c.swing,
             self._swing.reference, self._axes,
         )  # fmt: skip
-        gains = replace(
-            capture.gains,
+        gains = capture.gains.replace(
             root_accel=c.root_accel * omega**2,
             swing_accel=c.swing_accel * omega**2,
             joint_accel=c.joint_accel * omega**2,
         )
-        return replace(capture, gains=gains, **ticks)
+        return capture.replace(gains=gains, **ticks)
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
         if self.performance is None:
@@ -115,3 +121,7 @@ class MotionStep(CaptureStep):
             return super().torques(state, targets)
         perform_tick(self.perform_tick(state, targets))
         return self.tau[self._motors]
+
+
+#: what ``kind: motion-step`` makes, by the entry point in pyproject.toml
+KIND = (MotionStepConfig, MotionStep)

@@ -4,7 +4,6 @@ import numpy as np
 
 from poise.baselines.balance.references.footing import COM, LIGHT, PLACE, SPIN, TURN
 from poise.baselines.balance.references.splines import evaluate
-from poise.baselines.balance.references.tempo import CHANGE, RATE, TIME
 from poise.baselines.balance.stepping.planning.cop_region import (
     double_support_region,
     single_support_region,
@@ -14,14 +13,14 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, turned
 
-from .blocks import COS, GROUND, SIN, PerformTick, X, Y
+from .blocks import PerformTick
 
 
 @compiled
 def motion_time(t: PerformTick) -> float:
     """The motion's own time [s]."""
     p = t.performance
-    return p.pace.memory[TIME] if p.pace.waits else p.clock[0]
+    return p.pace.time if p.pace.waits else p.clock
 
 
 @compiled
@@ -61,7 +60,7 @@ def sample_footing(t: PerformTick, time: float) -> None:
     p = t.performance
     evaluate(p.knots, p.coeffs, False, time, p.samples[0], p.samples[1], p.samples[2])
     if p.pace.waits:
-        rate, change = p.pace.memory[RATE], p.pace.memory[CHANGE]
+        rate, change = p.pace.rate, p.pace.change
         for j in range(p.samples.shape[1]):
             p.samples[2, j] = rate * rate * p.samples[2, j] + change * p.samples[1, j]
             p.samples[1, j] *= rate
@@ -73,13 +72,13 @@ def put_frame(t: PerformTick) -> None:
     s, p = t.own.state, t.performance
     feet, place = s.sole_point, p.samples[0]
     yaw = heading_of(t)
-    p.frame[COS], p.frame[SIN] = turned(s.heading[0], s.heading[1], np.cos(yaw), -np.sin(yaw))
+    p.cos, p.sin = turned(s.heading[0], s.heading[1], np.cos(yaw), -np.sin(yaw))
     x = 0.5 * (place[PLACE[0]] + place[PLACE[1]])
     y = 0.5 * (place[PLACE[0] + 1] + place[PLACE[1] + 1])
-    x, y = turned(p.frame[COS], p.frame[SIN], x, y)
-    p.frame[X] = 0.5 * (feet[0, 0] + feet[1, 0]) - x
-    p.frame[Y] = 0.5 * (feet[0, 1] + feet[1, 1]) - y
-    p.frame[GROUND] = 0.5 * (feet[0, 2] + feet[1, 2])
+    x, y = turned(p.cos, p.sin, x, y)
+    p.x = 0.5 * (feet[0, 0] + feet[1, 0]) - x
+    p.y = 0.5 * (feet[0, 1] + feet[1, 1]) - y
+    p.floor = 0.5 * (feet[0, 2] + feet[1, 2])
     set_level_frame(t.own.memory.level_frame, s.heading[0], s.heading[1])
 
 
@@ -87,8 +86,8 @@ def put_frame(t: PerformTick) -> None:
 def heading_of(t: PerformTick) -> float:
     """The mean heading of the motion's soles, of both or of the one that bears [rad]."""
     m, turns = t.own.memory, t.performance.samples[0]
-    if m.swinging[0]:
-        return turns[TURN[1 - m.foot[0]] + 2]
+    if m.swinging:
+        return turns[TURN[1 - m.foot] + 2]
     return 0.5 * (turns[TURN[0] + 2] + turns[TURN[1] + 2])
 
 
@@ -96,23 +95,23 @@ def heading_of(t: PerformTick) -> float:
 def face(t: PerformTick) -> None:
     """Let the level frame be along the motion's soles that bear."""
     p, yaw = t.performance, heading_of(t)
-    x, y = turned(p.frame[COS], p.frame[SIN], np.cos(yaw), np.sin(yaw))
+    x, y = turned(p.cos, p.sin, np.cos(yaw), np.sin(yaw))
     set_level_frame(t.own.memory.level_frame, x, y)
 
 
 @compiled
-def to_world(t: PerformTick) -> None:
+def turn_to_world(t: PerformTick) -> None:
     """Turn CoM and places of `samples` to the world."""
     p = t.performance
     for column in (COM, PLACE[0], PLACE[1], SPIN):
         for r in range(3):
             x, y = p.samples[r, column], p.samples[r, column + 1]
-            x, y = turned(p.frame[COS], p.frame[SIN], x, y)
+            x, y = turned(p.cos, p.sin, x, y)
             p.samples[r, column], p.samples[r, column + 1] = x, y
         if column != SPIN:
-            p.samples[0, column] += p.frame[X]
-            p.samples[0, column + 1] += p.frame[Y]
-            p.samples[0, column + 2] += p.frame[GROUND]
+            p.samples[0, column] += p.x
+            p.samples[0, column + 1] += p.y
+            p.samples[0, column + 2] += p.floor
 
 
 @compiled
@@ -133,10 +132,10 @@ def stance_differs(t: PerformTick) -> bool:
 
 
 @compiled
-def pendulum_rate(t: PerformTick) -> float:
+def squared_rate(t: PerformTick) -> float:
     """ω² = (g + c̈_z)/(c_z − ground) of the motion [1/s²]; of 0.7 g at least."""
     p = t.performance
-    height = p.samples[0, COM + 2] - p.frame[GROUND]
+    height = p.samples[0, COM + 2] - p.floor
     gravity = t.own.robot.gravity
     return max(gravity + p.samples[2, COM + 2], LIGHT * gravity) / max(height, 1e-3)
 
@@ -145,7 +144,7 @@ def pendulum_rate(t: PerformTick) -> float:
 def wanted_cop(t: PerformTick, gain: float, out: np.ndarray) -> None:
     """p_ref + (1 + gain) (ξ − ξ_ref) into `out` (≥ 2,) [m]; p_ref = c − c̈/ω² − δ is the ZMP."""
     s, samples = t.own.state, t.performance.samples
-    rate = pendulum_rate(t)
+    rate = squared_rate(t)
     omega = np.sqrt(rate)
     for a in range(2):
         j = COM + a
@@ -160,8 +159,8 @@ def reached_region(t: PerformTick) -> int:
     c, m = t.own, t.own.memory
     feet, level, region = c.state.sole_point, m.level_frame, t.own.search.region
     cos, sin = level[0, 0], level[1, 0]
-    if m.swinging[0]:
-        stance = 1 - m.foot[0]
+    if m.swinging:
+        stance = 1 - m.foot
         return single_support_region(region, stance, feet[stance], cos, sin, m.region)
     return double_support_region(region, feet, cos, sin, c.cloud, m.region)
 

@@ -24,7 +24,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import copy_into, rotated, turned
 
-from .blocks import COS, GROUND, SIN, PerformTick
+from .blocks import PerformTick
 from .catching import ask_to_rest, go_on, leave, may_go_on
 from .schedule import (
     beyond_reach,
@@ -33,12 +33,12 @@ from .schedule import (
     lifted_foot,
     motion_time,
     next_switch,
-    pendulum_rate,
     phase_at,
     put_frame,
     reached_region,
     sample_footing,
-    to_world,
+    squared_rate,
+    turn_to_world,
     wanted_cop,
 )
 
@@ -49,12 +49,12 @@ SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame i
 
 
 @compiled
-def ask_for(t: PerformTick, corners: int) -> None:
+def perform_targets(t: PerformTick, corners: int) -> None:
     """The targets of a tick that performs."""
     c, p, s, own, given = t.own, t.performance, t.own.state, t.own.reference_out, t.given
     wanted_cop(t, p.gain, c.vector)
     find_nearest(c.memory.region[:corners], c.vector, c.pair)
-    rate = pendulum_rate(t)
+    rate = squared_rate(t)
     for a in range(2):
         own.cop[a] = c.pair[a]
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
@@ -64,20 +64,20 @@ def ask_for(t: PerformTick, corners: int) -> None:
     copy_into(given.q_ref, own.q_ref)
     copy_into(given.v_ref, own.v_ref)
     copy_into(given.angular_momentum, own.angular_momentum)
-    root_reference(c.robot, p.frame[COS], p.frame[SIN], p.samples[:, ROOT : ROOT + 3], own)
+    root_reference(c.robot, p.cos, p.sin, p.samples[:, ROOT : ROOT + 3], own)
     limit_posture(c)
     for j in range(own.a_ref.shape[0]):
         own.a_ref[j] += given.a_ref[j]
 
 
 @compiled
-def limit_loads(t: PerformTick, time: float) -> None:
+def shift_loads(t: PerformTick, time: float) -> None:
     """Let the load go to the foot that has landed, and leave the one that lifts off next."""
     c, p, m = t.own, t.performance, t.own.memory
     weight, limits = c.robot.mass * c.robot.gravity, c.on_both.load_limits
     limits[0] = limits[1] = np.inf
-    if m.steps[0] > 0:
-        limits[m.foot[0]] = weight * (FIRST_LOAD + m.clock[0] / p.load_time)
+    if m.steps > 0:
+        limits[m.foot] = weight * (FIRST_LOAD + m.clock / p.load_time)
     switch = next_switch(t, time)
     left = switch - time
     if left < p.unload_time:
@@ -86,26 +86,26 @@ def limit_loads(t: PerformTick, time: float) -> None:
         if foot >= 0 and not flies(t, phase):
             most = max(UNLOADED * left / p.unload_time, LEAST_LOAD)
             limits[foot] = min(limits[foot], weight * most)
-    c.on_both.limited[0] = 1
+    c.on_both.limited = 1
 
 
 @compiled
-def lift_off(t: PerformTick, foot: int, phase: int) -> None:
+def begin_swing(t: PerformTick, foot: int, phase: int) -> None:
     """Begin the swing of a foot."""
     c, p, m = t.own, t.performance, t.own.memory
-    m.steps[0] += 1
-    m.foot[0], m.swinging[0], m.load_fraction[0], m.corners[0] = foot, 1, 0.0, 0
-    p.begun[0] = phase
+    m.steps += 1
+    m.foot, m.swinging, m.load_fraction, m.corners = foot, 1, 0.0, 0
+    p.begun = phase
     duration = p.switches[phase] - p.switches[phase - 1]
-    start_swing(c.swing, c.state.sole_point[foot], p.frame[GROUND], duration)
+    start_swing(c.swing, c.state.sole_point[foot], p.floor, duration)
 
 
 @compiled
 def follow_foot(t: PerformTick) -> None:
     """Lead the swinging sole as the motion does; down, once it should have landed."""
-    c, p, w, foot = t.own, t.performance, t.own.swing, t.own.memory.foot[0]
+    c, p, w, foot = t.own, t.performance, t.own.swing, t.own.memory.foot
     place, turn = PLACE[foot], TURN[foot]
-    late = w.time[0] - w.duration[0]
+    late = w.time - w.duration
     for r in range(3):
         for a in range(3):
             w.reference[r, a] = p.samples[r, place + a]
@@ -122,9 +122,9 @@ def follow_foot(t: PerformTick) -> None:
         for b in range(3):
             level[b] = 1.0 if a == b else 0.0
         u, v, up = rotated(x, y, z, cos, sin, level)
-        t.axes[0, a], t.axes[1, a] = turned(p.frame[COS], p.frame[SIN], u, v)
+        t.axes[0, a], t.axes[1, a] = turned(p.cos, p.sin, u, v)
         t.axes[2, a] = up
-    w.time[0] += c.gains.period
+    w.time += c.gains.period
 
 
 @compiled
@@ -132,15 +132,15 @@ def in_flight(t: PerformTick, phase: int, time: float) -> bool:
     """Return whether the robot is in flight: from the motion's take-off until a sole touches the
     ground, late in the flight."""
     s, p = t.own.state, t.performance
-    if flies(t, phase) and p.begun[0] != phase and not t.own.memory.swinging[0]:
-        p.begun[0], p.flying[0] = phase, 1
-    if p.flying[0]:
-        last, end = p.switches[p.begun[0] - 1], p.switches[p.begun[0]]
+    if flies(t, phase) and p.begun != phase and not t.own.memory.swinging:
+        p.begun, p.flying = phase, 1
+    if p.flying:
+        last, end = p.switches[p.begun - 1], p.switches[p.begun]
         late = time > last + LANDING * (end - last)
         if late and (s.contacts[0] > 0.5 or s.contacts[1] > 0.5):
-            p.flying[0] = 0
-            t.own.memory.clock[0] = 0.0
-    return p.flying[0] == 1
+            p.flying = 0
+            t.own.memory.clock = 0.0
+    return p.flying == 1
 
 
 @compiled
@@ -150,7 +150,7 @@ def lead_soles(t: PerformTick, time: float, share: float) -> None:
     c, p, s = t.own, t.performance, t.own.state
     problem = c.on_both.problem
     accel, damping = problem.workspace.sole_accel, problem.parameters.sole_damping
-    late = max(time - p.switches[p.begun[0]], 0.0)
+    late = max(time - p.switches[p.begun], 0.0)
     for foot in range(2):
         up = s.sole_axes[foot, :, 2]
         for a in range(3):
@@ -179,16 +179,16 @@ def fly(t: PerformTick, time: float) -> None:
     accel, memory = contacts.problem.workspace.sole_accel, contacts.memory
     for foot in range(2):
         contacts.load_limits[foot] = WEIGHTLESS * c.robot.mass * c.robot.gravity
-    contacts.limited[0] = 1
-    ask_for(t, reached_region(t))
-    share, failures = 1.0, memory.failures[0]
+    contacts.limited = 1
+    perform_targets(t, reached_region(t))
+    share, failures = 1.0, memory.failures
     while True:
         lead_soles(t, time, share)
         solve_contacts(c, contacts)
-        if memory.failures[0] == failures or share < LEAST_SHARE:
+        if memory.failures == failures or share < LEAST_SHARE:
             break
         go_on_from(contacts, memory.torques)
-        memory.failures[0], share = failures, 0.5 * share
+        memory.failures, share = failures, 0.5 * share
     for r in range(accel.shape[0]):
         accel[r] = 0.0
 
@@ -198,31 +198,31 @@ def perform(t: PerformTick, time: float) -> bool:
     """A tick of the performance; False instead of torques where the planner has to take over."""
     c, p, m = t.own, t.performance, t.own.memory
     phase = phase_at(p.switches, time)
-    if m.steps[0] == 0 and next_switch(t, time) - time > SETTLING:
+    if m.steps == 0 and next_switch(t, time) - time > SETTLING:
         put_frame(t)
-    to_world(t)
-    if m.swinging[0] and has_landed(c):
-        m.swinging[0], m.clock[0] = 0, 0.0
+    turn_to_world(t)
+    if m.swinging and has_landed(c):
+        m.swinging, m.clock = 0, 0.0
     if in_flight(t, phase, time):
         fly(t, time)
         return True
     foot = lifted_foot(t, phase)
-    if not m.swinging[0] and foot >= 0 and p.begun[0] != phase and not flies(t, phase):
-        lift_off(t, foot, phase)
+    if not m.swinging and foot >= 0 and p.begun != phase and not flies(t, phase):
+        begin_swing(t, foot, phase)
     face(t)
     corners = reached_region(t)
-    if beyond_reach(t, corners) > (p.margin if m.swinging[0] else p.margin_both):
+    if beyond_reach(t, corners) > (p.margin if m.swinging else p.margin_both):
         leave(t)
         return False
-    ask_for(t, corners)
-    if m.swinging[0]:
+    perform_targets(t, corners)
+    if m.swinging:
         follow_foot(t)
-        contacts = c.on_second if m.foot[0] == 0 else c.on_first
-        contacts.limited[0] = 0
+        contacts = c.on_second if m.foot == 0 else c.on_first
+        contacts.limited = 0
     else:
         contacts = c.on_both
-        limit_loads(t, time)
-        m.clock[0] += c.gains.period
+        shift_loads(t, time)
+        m.clock += c.gains.period
     solve_contacts(c, contacts)
     return True
 
@@ -233,13 +233,13 @@ def perform_tick(t: PerformTick) -> None:
     torques."""
     c, p = t.capture, t.performance
     time = motion_time(t)
-    p.clock[0] += t.own.gains.period
+    p.clock += t.own.gains.period
     sample_footing(t, time)
-    if not p.performing[0] and may_go_on(t, time):
+    if not p.performing and may_go_on(t, time):
         go_on(t)
         sample_footing(t, time)
-    if not p.performing[0] or not perform(t, time):
+    if not p.performing or not perform(t, time):
         ask_to_rest(t)
         capture_tick(c)
-    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
-    c.failures[0] = failures + t.own.on_both.memory.failures[0]
+    failures = c.standing.memory.failures + c.on_both.memory.failures
+    c.failures = failures + t.own.on_both.memory.failures

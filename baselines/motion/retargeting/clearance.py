@@ -16,7 +16,7 @@ GAIN = 0.5  # of what a pair may approach, or is to part, in one step
 FASTEST = 0.02  # [m] by which a pair is to part in one step
 
 
-class Pair(NamedTuple):
+class GeometryPair(NamedTuple):
     """Two geometries that must not meet, and the distance that is kept [m]."""
 
     first: int
@@ -63,7 +63,7 @@ class ClearanceLimit(mink.Limit):
         pairs = self.candidates(data)
         return max(0.0, *(-self.distance(data, pair, np.empty(6)) for pair in pairs), 0.0)
 
-    def candidates(self, data: mujoco.MjData) -> list[Pair]:
+    def candidates(self, data: mujoco.MjData) -> list[GeometryPair]:
         """The pairs whose bounding spheres are near; a plane is never left out."""
         if not self.pairs:
             return []
@@ -74,13 +74,13 @@ class ClearanceLimit(mink.Limit):
         near = between - radius[first] - radius[second] < kept + NEAR
         return [self.pairs[i] for i in np.flatnonzero(near | endless)]
 
-    def distance(self, data: mujoco.MjData, pair: Pair, ends: np.ndarray) -> float:
+    def distance(self, data: mujoco.MjData, pair: GeometryPair, ends: np.ndarray) -> float:
         """Between the geometries of a pair [m], at most 3 cm more than what is kept; `ends` (6,)
         become the nearest points."""
         reach = pair.kept + NEAR
         return float(mujoco.mj_geomDistance(self.model, data, *pair[:2], reach, ends))
 
-    def row(self, data: mujoco.MjData, pair: Pair) -> tuple[float, np.ndarray | None]:
+    def row(self, data: mujoco.MjData, pair: GeometryPair) -> tuple[float, np.ndarray | None]:
         """The distance, and its derivative (nv,); None where the pair is far or just touches."""
         ends = np.empty(6)
         distance = self.distance(data, pair, ends)
@@ -96,7 +96,7 @@ class ClearanceLimit(mink.Limit):
         return distance, normal @ (jacobians[1] - jacobians[0])
 
 
-def find_pairs(robot: Robot, data: mujoco.MjData) -> tuple[Pair, ...]:
+def find_pairs(robot: Robot, data: mujoco.MjData) -> tuple[GeometryPair, ...]:
     """Pairs that collide in the simulation, without soles and floor; `data` holds standing.
 
     MuJoCo lets neither geometries of one body collide nor those of bodies that share a joint.
@@ -111,7 +111,7 @@ def find_pairs(robot: Robot, data: mujoco.MjData) -> tuple[Pair, ...]:
         kept = FLOOR if floor else APART
         now = mujoco.mj_geomDistance(model, data, first, second, kept, ends)
         if now > 0.0:  # links that overlap as they stand are drawn so
-            found.append(Pair(first, second, float(min(kept, now))))
+            found.append(GeometryPair(first, second, float(min(kept, now))))
     return tuple(found)
 
 

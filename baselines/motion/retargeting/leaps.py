@@ -11,7 +11,7 @@ from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.baselines.motion.clips.contacts import grounded, measure_contacts
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
@@ -47,7 +47,7 @@ def find_leaps(clip: Clip) -> list[Leap]:
 
     Raises ConfigError for one that runs: one foot swings before the flight.
     """
-    planted = measure_contacts(clip).planted
+    planted = grounded(measure_contacts(clip).planted, clip.dt)
     found = []
     for a, last in stances_of(np.asarray(~planted.any(axis=1))):
         b = last + 1

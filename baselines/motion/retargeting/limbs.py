@@ -41,7 +41,7 @@ class Point(NamedTuple):
         return total / len(self.parts)
 
 
-class Difference(NamedTuple):
+class LimbVector(NamedTuple):
     """One point as seen from another, in the world's axes."""
 
     point: Placed

@@ -13,7 +13,7 @@ from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import foot_signs, nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts
+from poise.baselines.motion.clips.contacts import grounded, longest_flight, measure_contacts
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
@@ -35,7 +35,7 @@ BEFORE, AFTER = STANDING, 1.6  # [s] of standing before the first and after the 
 TURN = 300.0  # [°] that a motion may turn: rotation vectors of a whole turn have no axis
 
 
-class Pace(NamedTuple):
+class ClipStep(NamedTuple):
     """A step: foot (0 left, 1 right), lift-off and touchdown [s], the end of the stance after it
     [s], and how high the foot gets [m], in the clip's sizes; with no end it steps beside the
     other."""
@@ -46,13 +46,13 @@ class Pace(NamedTuple):
     end: float | None
     apex: float
 
-    def at_speed(self, factor: float) -> Pace:
+    def at_speed(self, factor: float) -> ClipStep:
         """The step `factor` > 0 times as fast."""
         end = None if self.end is None else self.end / factor
         return self._replace(lift=self.lift / factor, land=self.land / factor, end=end)
 
 
-def find_paces(clip: Clip) -> list[Pace]:
+def find_paces(clip: Clip) -> list[ClipStep]:
     """The steps of a clip, in order.
 
     A foot lands when its heel or toe begins to rest, and lifts off when both have begun to move,
@@ -62,7 +62,7 @@ def find_paces(clip: Clip) -> list[Pace]:
     Raises:
         ConfigError: no foot is planted in the first frame, or none is for 0.07 s; no step.
     """
-    planted = measure_contacts(clip).planted
+    planted = grounded(measure_contacts(clip).planted, clip.dt)
     first, time = longest_flight(planted, clip.dt)
     if time > FLIGHT or not planted[0].any():
         raise ConfigError(
@@ -82,19 +82,19 @@ def find_paces(clip: Clip) -> list[Pace]:
                 continue
             left = stances[k - 1][1] if k else max(a - round(SWING / clip.dt), 0)
             apex = float(heights[left : a + 1].max()) - low
-            found.append(Pace(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
+            found.append(ClipStep(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
     found.sort(key=lambda pace: pace.land)
     if not found:
         raise ConfigError("its feet move, but take no step", source=clip.name, field="feet")
     return _in_turn(found)
 
 
-def _in_turn(found: list[Pace]) -> list[Pace]:
+def _in_turn(found: list[ClipStep]) -> list[ClipStep]:
     """Steps one after the other, and a last one that puts the foot behind beside the other one."""
     period = float(np.median(np.diff([pace.land for pace in found]))) if len(found) > 2 else 0.6
     last = found[-1]
     end = last.land + max(period, SWING + BOTH)
-    paces = [*found, Pace(1 - last.foot, last.land, end, None, last.apex)]
+    paces = [*found, ClipStep(1 - last.foot, last.land, end, None, last.apex)]
     made, before = [], -np.inf
     for pace in paces:
         lift = max(pace.lift - EARLY, before + BOTH)
@@ -106,8 +106,8 @@ def _in_turn(found: list[Pace]) -> list[Pace]:
 
 
 def plan_paces(
-    paces: list[Pace], tracks: Tracks, qpos: np.ndarray, robot: Robot, lead: int, scale: float,
-    low: float,
+    paces: list[ClipStep], tracks: Tracks, qpos: np.ndarray, robot: Robot, lead: int, scale: float,
+    low: float, swinging: float = SWINGING,
 ) -> FootPlan:  # fmt: skip
     """The plan of a clip's steps for a robot.
 
@@ -119,6 +119,7 @@ def plan_paces(
         lead: frames from standing into the clip, and back.
         scale: of the robot's legs over the clip's.
         low: height of the CoM from first to last step, over that of standing.
+        swinging: low-pass on trunk and arms [Hz].
     """
     begin = frames_before(paces, lead)
     frames = max(begin + len(qpos) + lead, begin + round((paces[-1].land + AFTER) / RATE))
@@ -146,13 +147,13 @@ def plan_paces(
     lean[:, :2] = low_pass(lean[:, :2], LEANING)
     root = led(lean, np.zeros(3), np.array([0.0, 0.0, yaws[-1].mean()]),
                 lead, begin, frames)  # fmt: skip
-    joints = calm_joints(robot, qpos, lead, begin, frames)
+    joints = calm_joints(robot, qpos, lead, begin, frames, swinging)
     return FootPlan(RATE, joints, root, _heights(frames, times, h, low), places,
                     turns.reshape(frames, 2, 3), planted)  # fmt: skip
 
 
 def _goals(
-    paces: list[Pace], tracks: Tracks, nominal: np.ndarray, left: int
+    paces: list[ClipStep], tracks: Tracks, nominal: np.ndarray, left: int
 ) -> list[tuple[np.ndarray, float]]:
     """Where each step lands: the sole's point (3,) on the ground [m], and its heading [rad].
 
@@ -190,15 +191,17 @@ def led(
                            np.repeat(last[None], after, axis=0)])  # fmt: skip
 
 
-def calm_joints(robot: Robot, qpos: np.ndarray, lead: int, begin: int, frames: int) -> np.ndarray:
+def calm_joints(
+    robot: Robot, qpos: np.ndarray, lead: int, begin: int, frames: int, cutoff: float = SWINGING
+) -> np.ndarray:
     """Return joints (F, nj) of a clip's postures, low-pass filtered and within their limits,
     blended from and to standing."""
     standing, (least, most) = robot.standing_qpos[7:], (robot.joint_range + [MARGIN, -MARGIN]).T
-    calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
+    calm = np.clip(low_pass(qpos[:, 7:], cutoff), least, most)
     return led(calm, standing, standing, lead, begin, frames)
 
 
-def frames_before(paces: list[Pace], lead: int) -> int:
+def frames_before(paces: list[ClipStep], lead: int) -> int:
     """How many frames of standing a clip has before it, `lead` of them at least."""
     return max(round((BEFORE - paces[0].lift) / RATE), lead)
 

@@ -1,12 +1,14 @@
 """A clip of any skeleton as a motion of a robot: its soles stay planted, or step as the clip's."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from poise.baselines.balance.references.footwork import perform_plan
+from poise.baselines.balance.references.footing import sole_poses
+from poise.baselines.balance.references.footwork import NotReached, perform_plan
 from poise.baselines.balance.references.robot_clip import RATE, About, RobotClip
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts
@@ -16,7 +18,7 @@ from poise.envs.robots.robot import Robot
 
 from .leaps import FLIGHTS, STANDS, WAYS, Leap, find_leaps, plan_leaps, tempo_of
 from .limbs import Limbs, find_limbs
-from .paces import find_paces, frames_before, plan_paces
+from .paces import SWINGING, find_paces, frames_before, plan_paces
 from .targets import BodyTargets, between_standing, clip_targets, standing_targets
 from .tracks import find_tracks, first_heading
 
@@ -32,6 +34,10 @@ TRIED = sorted(
     key=lambda each: -each[0] * each[1],
 )
 LOWER = (0.98, 0.965, 0.95, 0.935)  # heights of the CoM over standing that steps are tried at
+#: where no steps at `ENOUGH` of the clip's speed are found: lower by up to so much where legs do
+#: not reach [m]; shares of the clip's width of steps, and low-pass on trunk and arms [Hz]
+SINK, GIVING = 0.04, ((1.0, 1.5), (1.0, 0.9), (0.5, 0.9))
+NEARLY = 0.06  # [m, rad] that may lack for that
 ENOUGH = 0.7  # of the clip's speed: what is slower is not taken for the clip
 OFF = 0.003  # [m] by which a planted sole may be off
 SWIFTER = 2.0  # times `smooth` is what is kept of a motion that need not be performed
@@ -50,6 +56,8 @@ class Retargeted(NamedTuple):
         tempo: how many times as fast as the clip it is.
         flight: share of the time that the clip is in flight.
         bound: what keeps it from 0.7 of the clip's speed; empty where nothing does.
+        sunk: by how much the CoM is lower than planned where legs would not reach [m].
+        spread: share of the clip's width of steps that is kept.
     """
 
     clip: RobotClip
@@ -64,6 +72,8 @@ class Retargeted(NamedTuple):
     tempo: float = 1.0
     flight: float = 1.0
     bound: str = ""
+    sunk: float = 0.0
+    spread: float = 1.0
 
 
 def retarget(
@@ -148,26 +158,71 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
     frames = max(round(lead / RATE), 1)
     solved: dict[float, Any] = {}
     reason, bound = None, ""
-    for stride, tempo in TRIED:
+
+    def made_of(trial: RetargetTrial) -> Retargeted:
+        """The motion of a trial; raises ConfigError as `perform_plan`."""
+        tempo = trial.tempo
         slower = clip if tempo == 1.0 else clip.at_speed(tempo)
-        tracks = find_tracks(slower, robot, limbs, smooth, stride)
+        tracks = find_tracks(slower, robot, limbs, smooth, trial.stride, trial.spread)
         if tempo not in solved:
             solved[tempo] = solve_tracks(robot, limbs, tracks, smooth)
         timed = [pace.at_speed(tempo) for pace in paces]
-        for low in LOWER:
-            plan = plan_paces(timed, tracks, solved[tempo].qpos, robot, frames, scale, low)
-            try:
-                qpos = perform_plan(robot, plan, clip.name)
-            except ConfigError as error:
-                reason = error
-                bound = error.message if stride * tempo >= ENOUGH else bound
-                continue
-            made = _retargeted(solved[tempo]._replace(qpos=qpos), clip, robot, limbs,
-                               planted=plan.planted, stride=stride,
-                               begins=RATE * frames_before(timed, frames))  # fmt: skip
-            return made._replace(tempo=tempo, bound=bound if stride * tempo < ENOUGH else "")
+        plan = plan_paces(timed, tracks, solved[tempo].qpos, robot, frames, scale, trial.low,
+                          trial.calm)  # fmt: skip
+        qpos = perform_plan(robot, plan, clip.name, trial.sink)
+        sunk = float((plan.height - sole_poses(robot, qpos)[0][:, 2]).max()) if trial.sink else 0.0
+        made = _retargeted(solved[tempo]._replace(qpos=qpos), clip, robot, limbs,
+                           planted=plan.planted, stride=trial.stride,
+                           begins=RATE * frames_before(timed, frames))  # fmt: skip
+        return made._replace(tempo=tempo, sunk=sunk, spread=trial.spread)
+
+    slow: Retargeted | None = None
+    lacks: dict[tuple[float, float], float] = {}  # by way: what is lacking, at the lowest CoM
+    for trial in _trials():
+        if trial.sink and lacks.get(trial.way, np.inf) > NEARLY:
+            continue
+        if slow is not None and trial.stride * trial.tempo < ENOUGH:
+            continue  # the fastest of these was found before
+        try:
+            made = made_of(trial)
+        except ConfigError as error:
+            reason = error
+            if trial.stride * trial.tempo >= ENOUGH and not trial.sink:
+                bound = error.message
+                lacks[trial.way] = error.by if isinstance(error, NotReached) else np.inf
+            continue
+        if made.stride * made.tempo >= ENOUGH:
+            return made
+        slow = slow or made._replace(bound=bound)
+    if slow is not None:
+        return slow
     assert reason is not None
     raise reason
+
+
+class RetargetTrial(NamedTuple):
+    """What is tried of steps: shares of the clip's length and tempo, the height of the CoM, how
+    much lower it may be [m], the share of the width, the low-pass on trunk and arms [Hz]."""
+
+    stride: float
+    tempo: float
+    low: float
+    sink: float = 0.0
+    spread: float = 1.0
+    calm: float = SWINGING
+
+    @property
+    def way(self) -> tuple[float, float]:
+        return self.stride, self.tempo
+
+
+def _trials() -> Iterator[RetargetTrial]:
+    """As the clip has them, the fastest first; then with a CoM that is lower where legs do not
+    reach, steps that are less wide, and calmer arms."""
+    yield from (RetargetTrial(*way, low) for way in TRIED for low in LOWER)
+    fast = [way for way in TRIED if way[0] * way[1] >= ENOUGH]
+    for spread, calm in GIVING:
+        yield from (RetargetTrial(*way, LOWER[-1], SINK, spread, calm) for way in fast)
 
 
 def _leaping(

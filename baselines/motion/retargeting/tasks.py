@@ -11,7 +11,7 @@ import numpy as np
 
 from poise.envs.robots.robot import Robot
 
-from .limbs import Difference, Limbs, Placed, Point
+from .limbs import Limbs, LimbVector, Placed, Point
 from .targets import LINES, BodyTargets
 
 RANK = 1e-6  # of the largest singular value: smaller ones are rounding
@@ -120,7 +120,7 @@ class FrameTasks:
 
     def __init__(self, robot: Robot, limbs: Limbs, names: list[str]):
         self.configuration = mink.Configuration(robot.model, q=robot.standing_qpos)
-        hips = Difference(limbs.points["pelvis"], limbs.points["feet"])
+        hips = LimbVector(limbs.points["pelvis"], limbs.points["feet"])
         self.segments, self.height = SegmentTask(limbs, names), PointTask(hips, HEIGHT, axes=[2])
         data = self.configuration.data
         self.standing = float(hips.place(data)[2])

@@ -45,11 +45,13 @@ class Tracks(NamedTuple):
 
 
 def find_tracks(
-    clip: Clip, robot: Robot, limbs: Limbs, cutoff: float, stride: float = 1.0
-) -> Tracks:
+    clip: Clip, robot: Robot, limbs: Limbs, cutoff: float, stride: float = 1.0,
+    spread: float = 1.0,
+) -> Tracks:  # fmt: skip
     """Where a clip leads a robot, low-passed at `cutoff` [Hz].
 
-    Ways over the ground are `stride` times as long as the legs' ratio has them.
+    Ways over the ground are `stride` times as long as the legs' ratio has them, and feet `spread`
+    times as much further apart than in standing.
 
     Raises ConfigError for joints that are not known by name, or fewer than 8 frames.
     """
@@ -90,7 +92,8 @@ def find_tracks(
             rise = np.minimum(rise, toe[:, 2] - np.percentile(toe[:, 2], FLOOR))
         beside = abs(float(mine[f"ankle_{side}"][1] - mine["pelvis"][1]))
         away = scale * (flat - pelvis)[:, :2]
-        across = np.maximum(sign * (away * left).sum(axis=1) - wider + beside, NARROW * beside)
+        across = beside + spread * (sign * (away * left).sum(axis=1) - wider)
+        across = np.maximum(across, NARROW * beside)
         way = root[:, :2] + ahead * (stride * (away * ahead).sum(axis=1))[:, None]
         way += sign * left * across[:, None]
         own = np.column_stack([way, np.maximum(scale * rise, 0.0), yaw])

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from poise.baselines.motion.retargeting.clearance import ClearanceLimit, Pair
+from poise.baselines.motion.retargeting.clearance import ClearanceLimit, GeometryPair
 from poise.baselines.motion.retargeting.targets import BodyTargets
 from poise.baselines.motion.retargeting.tasks import FrameTasks
 from poise.baselines.motion.space_time.constraints.constraint import Constraint
-from poise.baselines.motion.space_time.constraints.scene import Rows, Scene
+from poise.baselines.motion.space_time.constraints.scene import ConstraintRows, Scene
 from poise.baselines.motion.space_time.constraints.touch import Touch
 
 ENDLESS = np.array([np.inf])
@@ -38,14 +38,16 @@ class Asked:
         self.tasks.aim(self.targets, frame)
         return self.tasks.errors()
 
-    def clearance(self, scene: Scene, frame: int) -> list[Rows]:
+    def clearance(self, scene: Scene, frame: int) -> list[ConstraintRows]:
         """d ≥ d₀ for the pairs of geometries that are near, see `ClearanceLimit`."""
         data, found = scene.at(frame), []
         for pair in self._near(scene, frame):
             distance, row = self.limit.row(data, pair)
             if row is not None:
                 least = np.array([pair.kept])
-                found.append(Rows({frame: row[None]}, np.array([distance]), least, ENDLESS))
+                found.append(
+                    ConstraintRows({frame: row[None]}, np.array([distance]), least, ENDLESS)
+                )
         return found
 
     def too_near(self, scene: Scene, frame: int) -> float:
@@ -55,7 +57,7 @@ class Asked:
             total += max(pair.kept - self.limit.distance(data, pair, ends), 0.0)
         return total
 
-    def _near(self, scene: Scene, frame: int) -> list[Pair]:
+    def _near(self, scene: Scene, frame: int) -> list[GeometryPair]:
         """The pairs that are near, and how far apart each is to be."""
         touching = self.touching.get(frame, ())
         return [pair._replace(kept=0.0) if frozenset(pair[:2]) in touching else pair

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from poise.baselines.motion.space_time.constraints.constraint import Constraint
-from poise.baselines.motion.space_time.constraints.scene import Rows, Scene
+from poise.baselines.motion.space_time.constraints.scene import ConstraintRows, Scene
 from poise.configs.errors import ConfigError
 
 from .asked import Asked
 from .problem import MARGIN
-from .stance import motions, plant
+from .stance import motions, move_soles
 
 EVERY = 0.1  # [s] between keyframes
 STEPS = 5  # values of each parameter; fewer where that makes too many trials
@@ -58,7 +58,7 @@ def by_trial(scene: Scene, asked: Asked, constraints: Sequence[Constraint]) -> N
     for _ in range(ROUNDS):  # planting moves joints, too
         scene.qpos[moved, 7:] = np.clip(scene.qpos[moved, 7:], low, high)
         scene.move(scene.qpos)
-        plant(scene, moved)
+        move_soles(scene, moved)
 
 
 def _best(part: Scene, asked: Asked, constraints: Sequence[Constraint], key: int) -> np.ndarray:
@@ -103,16 +103,16 @@ def _operate(part: Scene, constraints: Sequence[Constraint], key: int, shares: n
         part.displace(key, ways.free @ step)
         part.qpos[key, 7:] = np.clip(part.qpos[key, 7:], low, high)
         part.move(part.qpos)
-        plant(part, np.array([key]))
+        move_soles(part, np.array([key]))
         rows = [list(each.rows(part, [key])) for each in constraints]
 
 
-def _size(rows: Sequence[Rows]) -> float:
+def _size(rows: Sequence[ConstraintRows]) -> float:
     """The norm of what rows miss."""
     return float(np.linalg.norm(np.concatenate([_missing(each) for each in rows] or [np.zeros(1)])))
 
 
-def _missing(rows: Rows) -> np.ndarray:
+def _missing(rows: ConstraintRows) -> np.ndarray:
     """(k,) what is to be added to the values so that they are within their bounds."""
     return np.clip(rows.value, rows.low, rows.high) - rows.value
 

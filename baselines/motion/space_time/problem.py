@@ -12,7 +12,7 @@ from poise.configs.errors import PoiseError
 
 from .asked import Asked
 from .program import Penalised, Quadratic, solve_program
-from .stance import Motions, motions, plant
+from .stance import SoleMotions, motions, move_soles
 from .trajectory import coordinate_derivative, coordinates, third_difference
 
 PENALTY = 100.0  # of what a user's constraint lacks [1/m, 1/rad], times its weight
@@ -89,7 +89,7 @@ class Problem:
                 moves.append(motions(scene, frame))
                 penalised += [Penalised(each, HARD) for each in self.asked.clearance(scene, frame)]
             else:
-                moves.append(Motions(np.zeros(nv), np.zeros((nv, 0))))
+                moves.append(SoleMotions(np.zeros(nv), np.zeros((nv, 0))))
         cost = self._quadratic(np.concatenate(errors), jacobians, moves)
         columns = (self.inner[:, None] * nv + np.arange(6, nv)).ravel()
         joints = scene.qpos[1:-1, 7:]
@@ -106,7 +106,7 @@ class Problem:
         ]
 
     def _quadratic(
-        self, errors: np.ndarray, jacobians: list[sparse.csr_matrix], moves: list[Motions]
+        self, errors: np.ndarray, jacobians: list[sparse.csr_matrix], moves: list[SoleMotions]
     ) -> Quadratic:
         scene = self.scene
         basis = sparse.block_diag([m.free for m in moves], format="csr")
@@ -144,7 +144,7 @@ def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = No
         for tried in SHARES:
             for frame in problem.inner.tolist():
                 scene.displace(frame, tried * step[frame])
-            plant(scene, problem.inner)
+            move_soles(scene, problem.inner)
             found = problem.cost()
             if found.whole < cost.whole:
                 share = tried

@@ -7,7 +7,7 @@ import numpy as np
 import osqp
 from scipy import sparse
 
-from poise.baselines.motion.space_time.constraints.scene import Rows
+from poise.baselines.motion.space_time.constraints.scene import ConstraintRows
 
 # Prices and curvatures are some powers of ten apart. OSQP's scaling, which makes them alike, and a
 # step size that follows the residuals took ten times the iterations.
@@ -22,7 +22,7 @@ TINY = 1e-6  # curvature of slacks and of shared places
 class Penalised(NamedTuple):
     """Rows whose excess costs `weight` a unit; those of one `group` (≥ 0) share unknowns."""
 
-    rows: Rows
+    rows: ConstraintRows
     weight: float
     group: int = -1
 

@@ -43,7 +43,7 @@ class Quality(NamedTuple):
     violations: tuple[Violation, ...]
 
 
-def measure(scene: Scene, asked: Asked, constraints: tuple[Constraint, ...] = ()) -> Quality:
+def motion_quality(scene: Scene, asked: Asked, constraints: tuple[Constraint, ...] = ()) -> Quality:
     """The quality of a scene's postures.
 
     Args:

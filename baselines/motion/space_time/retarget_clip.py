@@ -58,7 +58,7 @@ class RetargetedClip(NamedTuple):
             needed.
         asked: commanded speed over the clip's at that tempo, since the walker is slower.
         flight: share of the time that the clip is in flight.
-        bound: as of `Retargeted`.
+        bound, sunk, spread: as of `Retargeted`.
     """
 
     clip: RobotClip
@@ -73,6 +73,8 @@ class RetargetedClip(NamedTuple):
     bound: str = ""
     walker: str = ""
     asked: float = 1.0
+    sunk: float = 0.0
+    spread: float = 1.0
 
 
 def retarget_clip(
@@ -200,7 +202,7 @@ def performable(
     from .asked import Asked  # mink is there: `retarget_to` has used it
     from .grid import by_trial
     from .problem import Problem, optimise
-    from .quality import measure
+    from .quality import motion_quality
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted, made.clip.dt)
     if steps:
@@ -217,7 +219,7 @@ def performable(
     if chosen != "frame":
         spent = (time.thread_time() - begun) / len(scene)
     done = replace(made.clip, qpos=scene.qpos)
-    quality = measure(scene, asked, wanted)
+    quality = motion_quality(scene, asked, wanted)
     return RetargetedClip(done, quality, chosen, made.scale, spent, begins=made.begins)
 
 
@@ -227,7 +229,8 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
 
     quality = measure_soles(scene, made.penetration, made.limit_excess, made.direction_error)
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
-                          made.begins, made.tempo, made.flight, made.bound)  # fmt: skip
+                          made.begins, made.tempo, made.flight, made.bound, sunk=made.sunk,
+                          spread=made.spread)  # fmt: skip
 
 
 def _scene(

@@ -12,7 +12,7 @@ SINGULAR = 0.02  # as in the solver of single frames: what hardly moves a foot i
 NEWTON, CLOSE = 6, 1e-10  # steps to planted soles at most, and the error [m, rad] that ends them
 
 
-class Motions(NamedTuple):
+class SoleMotions(NamedTuple):
     """The displacements δ = δ₀ + N z of a frame that lead its planted soles to where they are to
     be, as far as first order goes.
 
@@ -25,7 +25,7 @@ class Motions(NamedTuple):
     free: np.ndarray
 
 
-def motions(scene: Scene, frame: int) -> Motions:
+def motions(scene: Scene, frame: int) -> SoleMotions:
     """The displacements that keep both soles of a frame where they are planted.
 
     With the rows A = U S Vᵀ of both feet, N is the complement of V, and δ₀ = −V S/(S² + λ²) Uᵀ e:
@@ -36,7 +36,7 @@ def motions(scene: Scene, frame: int) -> Motions:
     rank = int((values > RANK * values[0]).sum())
     gains = values[:rank] / (values[:rank] ** 2 + SINGULAR**2)
     given = -right[:rank].T @ (gains * (left.T[:rank] @ error))
-    return Motions(given, right[rank:].T)
+    return SoleMotions(given, right[rank:].T)
 
 
 def sole_error(scene: Scene, frame: int) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +55,7 @@ def sole_error(scene: Scene, frame: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(errors), np.concatenate(rows)
 
 
-def plant(scene: Scene, frames: np.ndarray) -> None:
+def move_soles(scene: Scene, frames: np.ndarray) -> None:
     """Lead the soles of some frames (k,) to their places, by the shortest displacements."""
     for frame in frames.tolist():
         for _ in range(NEWTON):

@@ -9,12 +9,18 @@ from scipy.ndimage import uniform_filter1d
 from poise.baselines.balance.references.reference_motion import COLUMNS, MOST_COMMANDS, faster
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts, over_ground
+from poise.baselines.motion.clips.contacts import (
+    grounded,
+    longest_flight,
+    measure_contacts,
+    over_ground,
+)
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
+STRIDE = 0.6  # [s] without a foot on the ground: longer is no run
 LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
@@ -51,10 +57,10 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     run is walked.
 
     Raises:
-        ConfigError: both feet leave the ground at once; it takes no two steps, goes nowhere, or a
-            robot reaches less than `least` of its speed.
+        ConfigError: both feet leave the ground at once, or for 0.6 s; it takes no two steps, goes
+            nowhere, or a robot reaches less than `least` of its speed.
     """
-    planted = measure_contacts(clip).planted
+    planted = grounded(measure_contacts(clip).planted, clip.dt)
     run = _run(clip, planted)
     lands = np.sort(np.nonzero(np.diff(planted.astype(int), axis=0) > 0)[0]) * clip.dt
     if len(lands) < 2:
@@ -128,7 +134,8 @@ def _run(clip: Clip, planted: np.ndarray) -> str:
     if time <= FLIGHT:
         return ""
     says = f"both feet are off the ground for {time:.2f} s at {first * clip.dt:.2f} s"
-    if planted[max(first - round(TOGETHER / clip.dt), 0) : first].any(axis=0).all():
+    before = planted[max(first - round(TOGETHER / clip.dt), 0) : first]
+    if time > STRIDE or before.any(axis=0).all():
         raise ConfigError(says, source=clip.name, field="contacts")
     return f"{says}, so that it would be walked; "
 

@@ -11,13 +11,13 @@ from poise.baselines.motion.synthesis.scripts.tree import (
     Modifier,
     Overlay,
     Script,
+    ScriptTerm,
     Sequence,
     StateName,
-    Term,
 )
 from poise.configs.errors import shown
 
-from .stage import Stage, changed, layer_of, overlaid
+from .stage import Stage, changed, layer_of, overlaid_clip
 
 MOST_ACTIONS = 1000
 OVER = ("on", "weight")
@@ -58,16 +58,21 @@ class Reader:
     def actions(self) -> Actions:
         """Those of the whole script.
 
+        A posture that is first or last is where the way begins or ends. Any other is an action, a
+        rest in it; so is each of a script of postures alone.
+
         Raises ConfigError with line and column: no such clip, link group or posture, a posture that
-        is neither first nor last, a modifier that cannot be used, more than 1,000 actions.
+        is not alone, a modifier that cannot be used, more than 1,000 actions.
         """
         items = self._flat(self.script.sequence, len(self.script.defines), Arrow())
         states = [state_of(item[1]) for item in items]
+        if all(states):
+            if len(items) == 1:
+                raise self.script.wrong("a script needs a motion or two postures", 0)
+            return self._actions(items)
         start, goal = states[0], states[-1] if len(items) > 1 else None
         inner = items[start is not None : len(items) - (goal is not None)]
-        if not inner:
-            raise self.script.wrong("a script needs a motion, not postures alone", 0)
-        said = "next to a posture no transition is chosen by hand"
+        said = "next to a first or last posture no transition is chosen by hand"
         for state, arrow in ((start, inner[0][0]), (goal, items[-1][0])):
             if state is not None and arrow.kind:
                 raise self.script.wrong(said, arrow.at)
@@ -95,12 +100,12 @@ class Reader:
                     items.append((before, left, seen))
         return items
 
-    def _counted(self, term: Term) -> None:
+    def _counted(self, term: ScriptTerm) -> None:
         self.count += 1
         if self.count > MOST_ACTIONS:
             raise self.script.wrong(f"more than {MOST_ACTIONS} actions", term.at)
 
-    def _body(self, term: Term, seen: int) -> tuple[ClipName | StateName | Sequence, int]:
+    def _body(self, term: ScriptTerm, seen: int) -> tuple[ClipName | StateName | Sequence, int]:
         """What a term is, and how many definitions it sees: those before its own."""
         body = term.body
         if isinstance(body, ClipName):
@@ -113,6 +118,8 @@ class Reader:
         """The clip of the stage that an overlay is; made now if the graph has it not."""
         term = overlay.terms[0]
         body, _ = self._body(term, seen)
+        if (state := state_of(overlay)) is not None:
+            return self.stage.hold(state, self.script)
         if len(overlay.terms) == 1 and isinstance(body, ClipName) and not term.modifiers:
             return self._found(body)
         text = overlay_text(overlay)
@@ -131,18 +138,18 @@ class Reader:
             over = tuple(m for m in term.modifiers if m.kind in OVER)
             layers.append(layer_of(self._clip(term, seen, OVER), over, self.script))
         at = overlay.terms[1].at
-        clip = overlaid(base, layers, at, self.script)
+        clip = overlaid_clip(base, layers, at, self.script)
         with self.script.blamed(at):
             return self.again(clip)
 
-    def _clip(self, term: Term, seen: int, skipped: tuple[str, ...]) -> Clip:
+    def _clip(self, term: ScriptTerm, seen: int, skipped: tuple[str, ...]) -> Clip:
         """The clip of a term by itself, but for modifiers of the kinds `skipped`."""
         times, modifiers = _repeats(term)
         body, inner = self._body(term, seen)
         if isinstance(body, StateName):
-            raise self.script.wrong("a posture stands first or last, alone", term.at)
+            raise self.script.wrong("a posture stands alone", term.at)
         if times > 1 or isinstance(body, Sequence):
-            once = body if isinstance(body, Sequence) else Sequence((Overlay((Term(body),)),))
+            once = body if isinstance(body, Sequence) else Sequence((Overlay((ScriptTerm(body),)),))
             items = [item for _ in range(times) for item in self._flat(once, inner, Arrow())]
             clip = self.make(self._actions(items))
         else:
@@ -170,7 +177,7 @@ def state_of(overlay: Overlay) -> StateName | None:
     return term.body if alone and isinstance(term.body, StateName) else None
 
 
-def _repeats(term: Term) -> tuple[int, tuple[Modifier, ...]]:
+def _repeats(term: ScriptTerm) -> tuple[int, tuple[Modifier, ...]]:
     """Return how often a term is repeated, and its other modifiers."""
     times = 1
     for modifier in term.modifiers:

@@ -12,7 +12,7 @@ from poise.baselines.balance.references.robot_clip import FEWEST, About, RobotCl
 from poise.baselines.balance.references.stances import why_not_home
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.feasibility.check import FeasibilityLimits
-from poise.baselines.motion.feasibility.curve import End, JoinPart, Refused
+from poise.baselines.motion.feasibility.curve import End, JoinPart, WhyNot
 from poise.baselines.motion.feasibility.physical import (
     JoinRefused,
     direct_way,
@@ -158,7 +158,7 @@ class RobotJoins:
 
     def _direct(self, shaper: Shaper, a: End, b: End) -> Way | str:
         found = direct_way(shaper, a, b)
-        return found.reason if isinstance(found, Refused) else self._way(shaper, a, b, (found,))
+        return found.reason if isinstance(found, WhyNot) else self._way(shaper, a, b, (found,))
 
     def _way(self, shaper: Shaper, a: End, b: End, parts: tuple[JoinPart, ...]) -> Way:
         joints = np.vstack([a.q, *pause(shaper, parts), b.q])

@@ -10,11 +10,18 @@ from poise.baselines.motion.clips.link_groups import GROUPS
 from poise.baselines.motion.graphs.adjacency import end_to_begin, with_clip
 from poise.baselines.motion.graphs.frames import Frames, frames_of
 from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
-from poise.baselines.motion.graphs.motion_graph import GraphClip, MotionGraph, Transition
-from poise.baselines.motion.synthesis.scripts.tree import Modifier, Script
+from poise.baselines.motion.graphs.motion_graph import (
+    GraphClip,
+    MotionGraph,
+    StatePlace,
+    Transition,
+)
+from poise.baselines.motion.synthesis.scripts.printer import body_text
+from poise.baselines.motion.synthesis.scripts.tree import Modifier, Script, StateName
 from poise.configs.errors import ConfigError, shown
 
 LONGEST = 600.0  # [s] of a clip and of a whole motion
+HELD = 0.3  # [s] of rest in a posture
 
 
 class Stage:
@@ -65,6 +72,34 @@ class Stage:
         lengths = {clip.name: clip.duration for clip in self.graph.clips}
         return replace(made, leave=lengths[before])
 
+    def place(self, state: StateName, script: Script) -> StatePlace:
+        """Where a posture is: a state of the graph, or a clip at a time, from its first frame on.
+
+        Raises ConfigError with line and column: there is neither, or the clip ends before.
+        """
+        known = self.graph.states.get(state.name) if state.time is None else None
+        if known is not None:
+            return known
+        name, time = self.find(state.name), state.time or 0.0
+        if name is None:
+            choices = [*(self.graph.states if state.time is None else ()), *self.packed]
+            raise script.wrong(f"no posture {shown(state.name)}", state.at, choices)
+        if time > self.clips[name].duration:
+            raise script.wrong(f"{shown(name)} lasts {self.clips[name].duration:.2f} s",
+                               state.at)  # fmt: skip
+        return StatePlace(name, time)
+
+    def hold(self, state: StateName, script: Script) -> str:
+        """The clip, `HELD` long, that rests in a posture."""
+        text = body_text(state)
+        if text not in self.derived:
+            place = self.place(state, script)
+            clip = self.clips[place.clip]
+            frame = min(round(place.time / clip.dt), len(clip) - 1)
+            with script.blamed(state.at):
+                self.add(text, clip.part(np.full(round(HELD / clip.dt) + 1, frame)))
+        return text
+
     def posture(self, name: str, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Height (3,) and rotations (J, 4) of a clip at a time [s], facing x."""
         clip = self.clips[name]
@@ -104,7 +139,7 @@ def layer_of(clip: Clip, modifiers: tuple[Modifier, ...], script: Script) -> Lay
     return Layer(clip, tuple(groups), weight)
 
 
-def overlaid(base: Clip, layers: list[Layer], at: int, script: Script) -> Clip:
+def overlaid_clip(base: Clip, layers: list[Layer], at: int, script: Script) -> Clip:
     """The base under its layers; an error says where the overlay stands."""
     try:
         return overlay(base, layers)

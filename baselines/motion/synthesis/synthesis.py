@@ -10,12 +10,11 @@ from poise.baselines.motion.graphs.frames import nearest_places
 from poise.baselines.motion.graphs.joining.joins import JOINS, laid_on
 from poise.baselines.motion.graphs.motion_graph import (
     MotionGraph,
-    StatePlace,
     Transition,
     earliest_part,
     latest_part,
 )
-from poise.baselines.motion.graphs.paths import Path, Place, Step, Task
+from poise.baselines.motion.graphs.paths import Path, PathTask, Place, Step
 from poise.baselines.motion.graphs.search import best_paths
 from poise.baselines.motion.retargeting.performed import planned_again
 from poise.baselines.motion.synthesis.scripts.printer import text_of
@@ -81,7 +80,7 @@ class Synthesis:
             "duration": clip.duration,
             "cost": plan.paths[0].cost,
             "made": sorted(self.stage.derived),
-            "played": [asdict(part) for part in parts],
+            "parts": [asdict(part) for part in parts],
             "others": [{"cost": path.cost, "clips": [step.clip for step in path.steps]}
                        for path in plan.paths[1:]],
         }  # fmt: skip
@@ -100,7 +99,7 @@ class Synthesis:
                 continue
             arrows[i], kinds[i] = self._by_hand(actions, i, script), arrow.kind
         ends = [self._places(state, script) for state in (actions.start, actions.goal)]
-        task = Task(actions.names, arrows, *ends)
+        task = PathTask(actions.names, arrows, *ends)
         try:
             paths = self._best_paths(task, k)
         except ConfigError as error:
@@ -144,7 +143,7 @@ class Synthesis:
             raise script.wrong(said, arrow.at, choices)
         return made
 
-    def _best_paths(self, task: Task, k: int) -> list[Path]:
+    def _best_paths(self, task: PathTask, k: int) -> list[Path]:
         """Ways of which every transition can be made; by standing if there is no other one."""
         graph = self.stage.graph
         if self.kind != PHYSICAL:
@@ -163,13 +162,7 @@ class Synthesis:
     def _places(self, state: StateName | None, script: Script) -> dict[Place, float]:
         if state is None:
             return {}
-        states = self.stage.graph.states
-        place = states.get(state.name)
-        if place is None and (name := self.stage.find(state.name)) is not None:
-            place = StatePlace(name)  # how the clip begins
-        if place is None:
-            raise script.wrong(f"no posture {shown(state.name)}", state.at,
-                               [*states, *self.stage.packed])  # fmt: skip
+        place = self.stage.place(state, script)
         posture = self.stage.posture(place.clip, place.time)
         with script.blamed(state.at):
             return nearest_places(self.stage.frames, posture,

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from poise.baselines.balance.references.robot_clip import ABOUT, check_robot, read_robot_clip
+from poise.baselines.balance.references.robot_clip import ABOUT, check_clip_robot, read_robot_clip
 from poise.configs.archives import read_archive, read_arrays, read_names
 from poise.configs.errors import ConfigError
 from poise.configs.reading import MIB, parsing, read_text
@@ -23,7 +23,7 @@ LARGEST = 1e4  # [m, rad, rad/s]
 NPZ = ("joint_pos", "joint_vel", "body_pos_w", "body_quat_w")  # of Isaac Lab's and mjlab's tracking
 
 
-class Frames(NamedTuple):
+class ClipFrames(NamedTuple):
     """Frames as a file has them, `rate` [Hz] of them a second; joints in the file's own order."""
 
     rate: float
@@ -100,9 +100,9 @@ def read_clip(
     archive = read_archive(path)
     if ABOUT in archive.names:
         clip = read_robot_clip(path)
-        check_robot(clip, robot, str(path))
+        check_clip_robot(clip, robot, str(path))
         q = clip.qpos
-        frames = Frames(1.0 / clip.dt, q[:, :3], q[:, 3:7], q[:, 7:], None)
+        frames = ClipFrames(1.0 / clip.dt, q[:, :3], q[:, 3:7], q[:, 7:], None)
         return _clip(path, robot, list(robot.joint_names), period, frames)
     lost = [name for name in NPZ if f"{name}.npy" not in archive.names]
     if lost:
@@ -113,13 +113,13 @@ def read_clip(
 
 
 def make_clip(
-    name: str, robot: Robot, joints: Sequence[str], period: float, frames: Frames
+    name: str, robot: Robot, joints: Sequence[str], period: float, frames: ClipFrames
 ) -> FrameClip:
     """The same of frames that are given; raises ConfigError naming `name`."""
     return _clip(Path(name), robot, list(joints), period, frames)
 
 
-def _csv(path: Path, robot: Robot, rate: float) -> Frames:
+def _csv(path: Path, robot: Robot, rate: float) -> ClipFrames:
     lines = [line for line in read_text(path, CSV_BYTES).splitlines() if line.strip()]
     if lines and not _is_row(lines[0]):  # names of the columns
         lines = lines[1:]
@@ -130,7 +130,7 @@ def _csv(path: Path, robot: Robot, rate: float) -> Frames:
         found = rows.shape[1] if rows.ndim == 2 else "other"
         raise ConfigError(f"has {found} columns; {robot.name!r} has {7 + n}: position, quaternion "
                           f"xyzw and {n} joints", source=path)  # fmt: skip
-    return Frames(rate or LAFAN_RATE, rows[:, :3], rows[:, [6, 3, 4, 5]], rows[:, 7:], None)
+    return ClipFrames(rate or LAFAN_RATE, rows[:, :3], rows[:, [6, 3, 4, 5]], rows[:, 7:], None)
 
 
 def _is_row(line: str) -> bool:
@@ -140,7 +140,7 @@ def _is_row(line: str) -> bool:
         return False
 
 
-def _tracking(path: Path, robot: Robot, joints: Sequence[str]) -> Frames:
+def _tracking(path: Path, robot: Robot, joints: Sequence[str]) -> ClipFrames:
     arrays = read_arrays(path, (*NPZ, "fps"), kinds="fiu")
     q, v = arrays["joint_pos"], arrays["joint_vel"]
     places, quats = arrays["body_pos_w"], arrays["body_quat_w"]
@@ -151,17 +151,19 @@ def _tracking(path: Path, robot: Robot, joints: Sequence[str]) -> Frames:
     if not 1.0 <= rate <= 1000.0:
         raise ConfigError(f"must be from 1 to 1000 Hz, not {rate:g}", source=path, field="fps")
     if q.ndim == 2 and q.shape[1] == 7 + n and v.shape[1] == 6 + n:  # with the root before
-        return Frames(rate, q[:, :3], q[:, 3:7], q[:, 7:], v[:, 6:])
+        return ClipFrames(rate, q[:, :3], q[:, 3:7], q[:, 7:], v[:, 6:])
     if q.shape[1:] != (n,) or v.shape[1:] != (n,):
         raise ConfigError(f"has {q.shape[-1]} joints, the policy {n}", source=path,
                           field="joint_pos")  # fmt: skip
     bodies = list(read_names(path, "body_names"))
     own = robot.model.body(robot.root_body_id).name
     root = bodies.index(own) if own in bodies else 0
-    return Frames(rate, places[:, root], quats[:, root], q, v)
+    return ClipFrames(rate, places[:, root], quats[:, root], q, v)
 
 
-def _clip(path: Path, robot: Robot, joints: list[str], period: float, frames: Frames) -> FrameClip:
+def _clip(
+    path: Path, robot: Robot, joints: list[str], period: float, frames: ClipFrames
+) -> FrameClip:
     """Frames of the robot's joints, each `period`; those that it leaves out stand."""
     whole = [frames.root, frames.quat, frames.joints]
     whole += [] if frames.velocities is None else [frames.velocities]

@@ -17,7 +17,7 @@ from .config import MotionConfig
 USUAL_ANCHOR = "torso_link"  # of trackers of the G1, where nothing names one
 
 
-class Frame(NamedTuple):
+class TrackFrame(NamedTuple):
     """A frame of the motion in the world, and the robot's anchor now; n joints of the policy."""
 
     step: int  # of the clip
@@ -41,7 +41,7 @@ def _roll_pitch(axes: np.ndarray) -> np.ndarray:
 
 
 #: term → its numbers of a frame
-MOTION_TERMS: dict[str, Callable[[Frame], np.ndarray]] = {
+MOTION_TERMS: dict[str, Callable[[TrackFrame], np.ndarray]] = {
     "motion_command": lambda f: np.concatenate([f.joints, f.velocities]),
     "motion_joint_pos": lambda f: f.joints,
     "motion_joint_pos_rel": lambda f: f.joints - f.default,
@@ -68,7 +68,7 @@ PER_JOINT = ("motion_joint_pos", "motion_joint_pos_rel", "motion_joint_vel")
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class TrackedClip:
     """A clip with what follows of it: velocities of the root, and where the anchor is (T, …)."""
 
     clip: FrameClip
@@ -112,7 +112,7 @@ class MotionTrack:
         self.turn, self.shift = np.eye(3), np.zeros(3)
         self._robot_anchor, self._robot_axes, self._step = np.zeros(3), np.eye(3), 0
 
-    def _course(self, clip: FrameClip) -> Course:
+    def _course(self, clip: FrameClip) -> TrackedClip:
         count, period = len(clip.qpos), clip.period
         rates, anchors, axes, roots = [np.zeros((count, *shape)) for shape in (
             (3,), (3,), (3, 3), (3, 3))]  # fmt: skip
@@ -129,7 +129,7 @@ class MotionTrack:
                                            clip.qpos[first], clip.qpos[second])  # fmt: skip
                 rates[i] = moved[3:6]
         velocity = np.gradient(clip.qpos[:, :3], period, axis=0) if count > 1 else np.zeros((1, 3))
-        return Course(clip, roots, velocity, rates, anchors, axes)
+        return TrackedClip(clip, roots, velocity, rates, anchors, axes)
 
     def begin(self, state: RobotState) -> None:
         """Lay the clip where the robot stands, as it faces."""
@@ -161,12 +161,12 @@ class MotionTrack:
         found[3:7] = turned
         return found
 
-    def frame(self, ahead: int = 0) -> Frame:
+    def frame(self, ahead: int = 0) -> TrackFrame:
         """The frame that is so many policy steps ahead; its first and last are held."""
         i, course = self.place(ahead), self.course
         moves = 1.0 if self.config.plays else 0.0
         last = max(1, len(course.clip.qpos) - 1)
-        return Frame(
+        return TrackFrame(
             i, i / last, course.clip.qpos[i, 7:][self.index],
             moves * course.clip.velocities[i, self.index], self.default,
             self.turn @ course.clip.qpos[i, :3] + self.shift, self.turn @ course.root_axes[i],

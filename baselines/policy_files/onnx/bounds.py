@@ -71,7 +71,7 @@ def try_network(path: Path, digest: str) -> None:
         raise ConfigError(problem, source=path)
 
 
-class Clocked:
+class RunOptions:
     """The options of runs of onnxruntime that end with an error after `LONGEST`."""
 
     def __init__(self) -> None:
@@ -94,7 +94,7 @@ class Clocked:
             self.begun = None
 
 
-_running: WeakSet[Clocked] = WeakSet()
+_running: WeakSet[RunOptions] = WeakSet()
 _lock = threading.Lock()  # of the set, which two threads look at
 _thread: threading.Thread | None = None
 

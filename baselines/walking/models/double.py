@@ -98,7 +98,7 @@ def double_tick(t: DoubleTick) -> None:
     clear_answers(r)
     for leg in range(2):
         now = t.flexion[leg]
-        if r.share[0, leg] <= 0.0 or r.begun[0] == 0:
+        if r.share[0, leg] <= 0.0 or r.begun == 0:
             now[0] = min(max(legs.flexion[leg], t.least), t.most)
             now[1] = now[2] = 0.0
         if r.share[0, leg] > 0.0:
@@ -149,7 +149,7 @@ def seed_leg(t: DoubleTick, leg: int, now: np.ndarray) -> None:
     # ẋ = L2 cos θ θ̇ + L1 cos φ φ̇ with θ̇ = φ̇ + β̇
     arm, shin = legs.thigh * np.cos(phi), legs.shank * np.cos(theta)
     phi_rate = (speed - shin * legs.flexion_rate[leg]) / (arm + shin)
-    rate, time = phi_rate + legs.flexion_rate[leg], max(r.time_left[0], LEAST_TIME)
+    rate, time = phi_rate + legs.flexion_rate[leg], max(r.time_left, LEAST_TIME)
     length = length_at(legs.thigh, legs.shank, t.least)
     half = 0.5 * foothold
     below = np.sqrt(max(length * length - half * half, 0.0))

@@ -69,7 +69,7 @@ def spring_tick(t: SpringTick) -> None:
     hip = 0.0
     for leg in range(2):
         hip += r.share[0, leg] * legs.hip[leg, 2]
-    if r.begun[0] == 0:
+    if r.begun == 0:
         now[0], now[1] = hip, 0.0
     now[2] = -r.gravity
     for leg in range(2):

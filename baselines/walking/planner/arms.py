@@ -19,7 +19,6 @@ from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
 from .blocks import Arms, WalkTick
-from .command import ARM_SWING
 
 ROLES = ("shoulder_pitch_right", "shoulder_pitch_left")  # of foot sign −1, +1
 LEAST_STEP = 0.15  # [h] for the whole swing
@@ -44,7 +43,7 @@ def arm_scales(robot: Robot) -> np.ndarray:
     return scales
 
 
-def allocate_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Arms:
+def swinging_arms(robot: Robot, posture_weight: np.ndarray, weight: float) -> Arms:
     """The arms of a robot; `posture_weight` (nv,) is that of the QP, which `swing_arms` changes,
     and `weight` the one of joints that swing, in 1/ω⁴."""
     scales, swung = arm_scales(robot), posture_weight.copy()
@@ -70,9 +69,9 @@ def feet_apart(t: WalkTick, order: int) -> float:
     """x_0 − x_1 along the heading [m], as planned while a foot swings, or its derivative of this
     `order` in time."""
     c, w, level = t.walk, t.walk.swing, t.walk.memory.level_frame
-    foot, feet = c.memory.foot[0], c.state.sole_point
+    foot, feet = c.memory.foot, c.state.sole_point
     x, y = 0.0, 0.0
-    if c.memory.swinging[0]:
+    if c.memory.swinging:
         x, y = w.reference[order, 0], w.reference[order, 1]
         if order == 0:
             x, y = x - feet[1 - foot, 0], y - feet[1 - foot, 1]
@@ -88,15 +87,15 @@ def feet_apart(t: WalkTick, order: int) -> float:
 def swing_arms(t: WalkTick, period: float) -> None:
     """Add the swing that is commanded to the posture's references; a step takes `period` [s]."""
     arms, own, g = t.arms, t.walk.reference_out, t.gait
-    weight, amplitude = t.walk.on_both.problem.parameters.accel_weight, g.command[ARM_SWING]
+    weight, amplitude = t.walk.on_both.posture.weight, g.commanded_arm_swing
     if amplitude <= 0.0:
-        if arms.swinging[0]:
+        if arms.swinging:
             copy_into(arms.free_weight, weight)
-            arms.swinging[0] = 0
+            arms.swinging = 0
         return
-    if not arms.swinging[0]:
+    if not arms.swinging:
         copy_into(arms.weight, weight)
-        arms.swinging[0] = 1
+        arms.swinging = 1
     share = amplitude / max(abs(g.velocity[0]) * period, arms.least_step)
     angle, rate, acceleration = feet_apart(t, 0), feet_apart(t, 1), feet_apart(t, 2)
     angle, rate = share * angle, share * rate

@@ -8,36 +8,38 @@ import numpy as np
 from poise.baselines.balance.stepping.planning.blocks import CaptureTick, StepMemory
 from poise.baselines.balance.stepping.planning.swing import Swing
 from poise.baselines.walking.models.reference import Reference
-from poise.envs.compiled.block import Block, Integer, Number
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
+from poise.envs.compiled.mutable import Mutable
 
-from .command import ENTRIES
 
-
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Treads(Block):
     """The surfaces on which footholds are given, and how the foot swings between them."""
 
-    surfaces: np.ndarray  # (n, 6) see `Surface`; none: footholds are free
+    surfaces: np.ndarray  # (n,) see `surface_arrays`; none: footholds are free
     margin: float  # [m]
     least_step: float  # [m]
     approach: float  # [m]
     highest: float  # [m]
     clearance: float  # [m]
-    hold: np.ndarray  # (2,) up, down [of the swing]
-    rise: np.ndarray  # (2,)
-    lower: np.ndarray  # (2,)
+    hold_up: float  # of a swing that goes up [of the swing]
+    hold_down: float
+    rise: float
+    rise_down: float
+    lower: float
+    lower_down: float
     arrive: float
     lean: float  # [rad/m]
     lean_from: float  # [m]
-    leaning: Number  # of the trunk ahead, now [rad]
+    leaning: Mutable[float]  # of the trunk ahead, now [rad]
     left: Annotated[np.ndarray, 3]  # where the swinging foot lifted off [m]
-    aim: Integer  # the surface that the step goes to
-    target: Number  # height of the foothold that is being weighed [m]
+    aim: Mutable[int]  # the surface that the step goes to
+    target: Mutable[float]  # height of the foothold that is being weighed [m]
     room: Annotated[np.ndarray, 2]  # scratch: from a sole's point to its heel and its toes [m]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Gait(Block):
     """A `GaitConfig` in SI units, the command, and how far the walk is."""
 
@@ -56,21 +58,30 @@ class Gait(Block):
     speed_margin: float  # [m/s]
     time_min: float  # of a step, whatever the command says [s]
     lower: float  # from when a swinging foot comes down [of the swing]; 0: once it is up
-    command: Annotated[np.ndarray, ENTRIES]  # see `GaitCommand.array`
+    catch: float  # the miss of ξ from which the walk is given up [m]; 0: never
+    calm_time: float  # on both feet, after which it goes on [s]
+    command: np.ndarray  # (8,) see `GaitCommand.array`; those that follow are its entries
+    commanded_step_time: Mutable[float]  # [s]; 0 here and below: the gait's own
+    commanded_width: Mutable[float]  # [m]
+    commanded_clearance: Mutable[float]  # [m]
+    commanded_arm_swing: Mutable[float]  # [rad]
+    commanded_step_length: Mutable[float]  # [m]
     velocity: Annotated[np.ndarray, 3]  # ahead, left, turn, which follow the command
     error: Annotated[np.ndarray, 2]  # what the sum of the velocity's errors adds to it [m/s]
     planned: Annotated[np.ndarray, 2]  # the velocity with it [m/s]
-    yaw: Number  # of the heading [rad]
-    walking: Integer  # 1 from the first shift of weight until the walk has stopped
-    starting: Integer  # 1 until the first foot lifts off
-    clock: Number  # since both feet are down [s]
+    yaw: Mutable[float]  # of the heading [rad]
+    walking: Mutable[int]  # 1 from the first shift of weight until the walk has stopped
+    starting: Mutable[int]  # 1 until the first foot lifts off
+    clock: Mutable[float]  # since both feet are down [s]
     cop: Annotated[np.ndarray, 2]  # that was asked for last on one foot [m]
+    miss: Mutable[float]  # of ξ at touchdown, which that CoP leaves [m]
+    caught: Mutable[int]  # 1 from when the walk was given up until it goes on
     middle: Annotated[np.ndarray, 2]  # between the soles at the last touchdown [m]
-    step_clock: Number  # since then [s]; < 0: there was none
+    step_clock: Mutable[float]  # since then [s]; < 0: there was none
     treads: Treads
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Arms(Block):
     """The joints that swing the arms; as many arms as feet, none where `scales` are zero."""
 
@@ -78,7 +89,7 @@ class Arms(Block):
     weight: np.ndarray  # (nv,) of the posture in the QP while the arms swing as commanded
     free_weight: np.ndarray  # (nv,) else
     least_step: float  # [m] for the whole swing; less where steps are shorter
-    swinging: Integer  # 1 while they swing as commanded
+    swinging: Mutable[int]  # 1 while they swing as commanded
 
 
 @dataclass(frozen=True, eq=False)

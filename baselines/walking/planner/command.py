@@ -82,4 +82,3 @@ def command_of(array: np.ndarray) -> GaitCommand:
 #: of a command, in addition to its velocity and turn
 STEP_PARAMETERS = ("step_time", "width", "clearance", "arm_swing", "step_length")
 ENTRIES = COMMAND_ENTRIES  #: of the array of a command
-STEP_TIME, WIDTH, CLEARANCE, ARM_SWING, STEP_LENGTH = range(3, ENTRIES)  #: of its entries

@@ -73,7 +73,7 @@ def reach_of(robot: Robot, gait: Gait, limits: StepLimits, swing: SwingTask) -> 
     )
 
 
-def least_width(robot: Robot) -> float:
+def touching_width(robot: Robot) -> float:
     """The distance of the soles' middles across the heading with 1 cm between the soles [m]."""
     feet = zip(robot.soles, foot_signs(robot), strict=True)
     return float(sum((-sign * sole.polygon[:, 1]).max() for sole, sign in feet)) + APART
@@ -172,7 +172,7 @@ def _turn_range(
 
 
 def _width_range(robot: Robot, limits: StepLimits) -> Pair:
-    return least_width(robot), limits.width_max * robot.height_com
+    return touching_width(robot), limits.width_max * robot.height_com
 
 
 def _highest_clearance(robot: Robot, swing: SwingTask, time: float) -> float:

@@ -10,10 +10,9 @@ import numpy as np
 from poise.baselines.balance.stepping.planning.swing import quintic, time_left
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import turned
-from poise.envs.terrain.arrays import X_MAX, X_MIN, surface_below, surface_height
+from poise.envs.terrain.arrays import surface_below, surface_height
 
 from .blocks import Treads, WalkTick
-from .command import CLEARANCE
 
 FREE = 1.0  # [m] a surface that is longer leaves footholds free: several steps fit on it
 SIDE_BY_SIDE = 0.08  # [m] between feet that are not one behind the other
@@ -23,7 +22,6 @@ MOST_STEPS = 4  # before the first tread, in which the steps become as long as m
 NOT_HELD = 1.0  # [m] cost of a foothold where no surface holds the sole
 OTHER = 0.12  # [m] cost of another surface than the one that a step aims at
 SLOW = 0.02  # [m/s]
-UP, DOWN = 0, 1
 
 
 @compiled
@@ -48,7 +46,7 @@ def put_room(t: WalkTick, foot: int) -> None:
 @compiled
 def is_free(r: Treads, i: int) -> bool:
     """Return whether a surface leaves footholds free."""
-    return r.surfaces[i, X_MAX] - r.surfaces[i, X_MIN] > FREE
+    return r.surfaces[i].x_max - r.surfaces[i].x_min > FREE
 
 
 @compiled
@@ -60,16 +58,16 @@ def settle_on_tread(t: WalkTick, foot: int) -> float:
     put_room(t, foot)
     nearest, moved, found = NOT_HELD, place[0], False
     for i in range(r.surfaces.shape[0]):
-        low, high = r.surfaces[i, X_MIN] + r.room[0], r.surfaces[i, X_MAX] - r.room[1]
+        low, high = r.surfaces[i].x_min + r.room[0], r.surfaces[i].x_max - r.room[1]
         x = min(max(place[0], low), high)
         z = surface_height(r.surfaces, i, 0.0, x)
-        way = abs(x - place[0]) + (0.0 if i == r.aim[0] else OTHER)
+        way = abs(x - place[0]) + (0.0 if i == r.aim else OTHER)
         if high < low or abs(z - stance) > r.highest or way >= nearest:
             continue
         nearest, moved, found = way, x, True
-        r.target[0] = z
+        r.target = z
     if not found:
-        r.target[0] = stance
+        r.target = stance
     place[0] = moved
     return nearest
 
@@ -79,8 +77,8 @@ def first_place(r: Treads, i: int) -> float:
     """Where a sole goes on surface `i` that comes from before it: its middle, or, of a long one,
     near its edge [m]."""
     if is_free(r, i):
-        return r.surfaces[i, X_MIN] + r.room[0] + r.margin
-    return 0.5 * (r.surfaces[i, X_MIN] + r.surfaces[i, X_MAX])
+        return r.surfaces[i].x_min + r.room[0] + r.margin
+    return 0.5 * (r.surfaces[i].x_min + r.surfaces[i].x_max)
 
 
 @compiled
@@ -90,12 +88,12 @@ def meet_treads(t: WalkTick, period: float) -> None:
     On both feet it also decides which surface the next step is to go to.
     """
     g, r, c = t.gait, t.gait.treads, t.walk
-    foot, feet = c.memory.foot[0], c.state.sole_point
-    stance = feet[1 - foot] if c.memory.swinging[0] else feet[foot]
+    foot, feet = c.memory.foot, c.state.sole_point
+    stance = feet[1 - foot] if c.memory.swinging else feet[foot]
     i = surface_below(r.surfaces, stance[0], stance[1])
     g.error[0], g.planned[0] = 0.0, g.velocity[0]
-    if not c.memory.swinging[0]:
-        r.aim[0] = i
+    if not c.memory.swinging:
+        r.aim = i
     if g.velocity[0] <= SLOW or i < 0 or i + 1 >= r.surfaces.shape[0]:
         return
     put_room(t, foot)
@@ -103,9 +101,9 @@ def meet_treads(t: WalkTick, period: float) -> None:
     if is_free(r, i):
         steps = max(np.rint(way / max(g.velocity[0] * period, r.least_step)), 1.0)
         steps = max(steps, np.ceil(way / r.approach))
-    if not c.memory.swinging[0]:
-        r.aim[0] = i + 1 if steps == 1.0 else i
-    steps = 1.0 if r.aim[0] > i else max(steps, 2.0)
+    if not c.memory.swinging:
+        r.aim = i + 1 if steps == 1.0 else i
+    steps = 1.0 if r.aim > i else max(steps, 2.0)
     if steps <= MOST_STEPS:
         g.planned[0] = way / (steps * period)
 
@@ -119,7 +117,7 @@ def rise_near(r: Treads, place: np.ndarray) -> float:
     for k in (i, i + 1):  # the edge between surfaces k − 1 and k
         if k < 1 or k >= r.surfaces.shape[0]:
             continue
-        edge = r.surfaces[k, X_MIN]
+        edge = r.surfaces[k].x_min
         if abs(edge - place[0]) > r.approach:
             continue
         before = surface_height(r.surfaces, k - 1, 0.0, edge)
@@ -132,11 +130,11 @@ def lean_ahead(t: WalkTick) -> None:
     """Turn the trunk that is asked for ahead, by what the rise of the edges near the stance sole
     takes: a hip behind the CoM spares the knee of the leg ahead (docs/walking.md#terrain)."""
     c, r, own = t.walk, t.gait.treads, t.walk.reference_out
-    foot = c.memory.foot[0]
-    stance = c.state.sole_point[1 - foot if c.memory.swinging[0] else foot]
+    foot = c.memory.foot
+    stance = c.state.sole_point[1 - foot if c.memory.swinging else foot]
     asked = r.lean * max(rise_near(r, stance) - r.lean_from, 0.0)
-    r.leaning[0] += min(c.gains.period / LEANING, 1.0) * (asked - r.leaning[0])
-    cos, sin, level = np.cos(r.leaning[0]), np.sin(r.leaning[0]), c.memory.level_frame
+    r.leaning += min(c.gains.period / LEANING, 1.0) * (asked - r.leaning)
+    cos, sin, level = np.cos(r.leaning), np.sin(r.leaning), c.memory.level_frame
     for a in range(3):
         ahead = level[0, 0] * own.root_axes[0, a] + level[1, 0] * own.root_axes[1, a]
         up = own.root_axes[2, a]
@@ -158,15 +156,15 @@ def line_of_feet(t: WalkTick) -> tuple[float, float]:
     """Height [m] and gradient below the CoM of the line from a foot to the next one."""
     c, w, r = t.walk, t.walk.swing, t.gait.treads
     feet, x = c.state.sole_point, c.state.com[0]
-    first = 1 - c.memory.foot[0] if c.memory.swinging[0] else 0
+    first = 1 - c.memory.foot if c.memory.swinging else 0
     x0, z0, x1, z1 = feet[first, 0], feet[first, 2], feet[1 - first, 0], feet[1 - first, 2]
-    if c.memory.swinging[0]:
+    if c.memory.swinging:
         if x > x0:
-            x1, z1 = w.foothold[0], w.ground[0]
+            x1, z1 = w.foothold[0], w.ground
         else:
             x1, z1 = r.left[0], r.left[2]
     if abs(x1 - x0) < SIDE_BY_SIDE:
-        return (z0 if c.memory.swinging[0] else 0.5 * (z0 + z1)), 0.0
+        return (z0 if c.memory.swinging else 0.5 * (z0 + z1)), 0.0
     gradient, low, high = (z1 - z0) / (x1 - x0), min(x0, x1), max(x0, x1)
     if x < low or x > high:
         return z0 + gradient * (min(max(x, low), high) - x0), 0.0
@@ -189,14 +187,14 @@ def _lead(t: WalkTick, a: int, place: float, speed: float, until: float) -> None
     w, dt = t.walk.swing, t.walk.gains.period
     now = w.reference
     now[0, a], now[1, a], now[2, a] = quintic(
-        now[0, a], now[1, a], now[2, a], place, speed, 0.0, max(until - w.time[0], dt), dt
+        now[0, a], now[1, a], now[2, a], place, speed, 0.0, max(until - w.time, dt), dt
     )
 
 
 @compiled
 def apex_of_step(t: WalkTick) -> float:
     """How high a step on one surface lifts the sole [m]: as commanded, or the gait's own."""
-    wanted = t.gait.command[CLEARANCE]
+    wanted = t.gait.commanded_clearance
     return wanted if wanted > 0.0 else t.walk.swing.apex
 
 
@@ -204,15 +202,16 @@ def apex_of_step(t: WalkTick) -> float:
 def advance_over_edges(t: WalkTick) -> None:
     """Move the swing a tick further: up before it goes forward, and down when it is there."""
     w, r, dt = t.walk.swing, t.gait.treads, t.walk.gains.period
-    after, whole, rest = w.time[0] + dt, w.duration[0], time_left(w)
-    start, end = r.left[2], w.ground[0]
-    between = t.walk.state.sole_point[1 - t.walk.memory.foot[0], 2]
+    after, whole, rest = w.time + dt, w.duration, time_left(w)
+    start, end = r.left[2], w.ground
+    between = t.walk.state.sole_point[1 - t.walk.memory.foot, 2]
     own = surface_below(r.surfaces, r.left[0], r.left[1])
     plain = own == surface_below(r.surfaces, w.foothold[0], w.foothold[1])
-    way = DOWN if end < start - LEVEL else UP
-    hold, arrive, rise = r.hold[way] * whole, r.arrive * whole, r.rise[way] * whole
-    lower, apex = r.lower[way] * whole, max(start, end, between)
-    apex += max(r.clearance, t.gait.command[CLEARANCE])
+    down, arrive, apex = end < start - LEVEL, r.arrive * whole, max(start, end, between)
+    hold = (r.hold_down if down else r.hold_up) * whole
+    rise = (r.rise_down if down else r.rise) * whole
+    lower = (r.lower_down if down else r.lower) * whole
+    apex += max(r.clearance, t.gait.commanded_clearance)
     if plain:
         hold, arrive, rise, lower = 0.0, whole, w.lift * whole, w.lift * whole
         apex = end + apex_of_step(t)
@@ -233,4 +232,4 @@ def advance_over_edges(t: WalkTick) -> None:
     else:
         w.reference[0, 2] -= w.landing_speed * dt
         w.reference[1, 2], w.reference[2, 2] = -w.landing_speed, 0.0
-    w.time[0] = after
+    w.time = after

@@ -8,6 +8,7 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.body_points import BodyPoint, body_point, point_motion, update_point
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -15,15 +16,15 @@ from poise.envs.robots.robot import Robot
 from .contact import Contact, ContactRows, PointTick
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class PointContactBlock(Block):
     """A point contact in SI units. Write `force` and `largest` to lean more or less on it."""
 
     point: BodyPoint
     normal: np.ndarray  # (3,) out of the surface, world
     cone: np.ndarray  # (5, 3) cone · f ≤ (0, 0, 0, 0, largest)
-    force: np.ndarray  # (1,) along the normal, desired [N]
-    largest: np.ndarray  # (1,) along the normal [N]
+    force: Mutable[float]  # along the normal, desired [N]
+    largest: Mutable[float]  # along the normal [N]
     force_weight: float  # per N²
     damping: float  # k_v [1/s]
 
@@ -38,11 +39,11 @@ def fill_point(t: PointTick[PointContactBlock]):
         rows.position[a] = point.position[a]
         rows.accel[a] = -c.damping * point.J_v[a] - point.Jdot_v[a]
         rows.weights[a] = c.force_weight
-        rows.force[a] = c.force[0] * c.normal[a]
+        rows.force[a] = c.force * c.normal[a]
         copy_into(point.J[a], rows.J[a])
     for r in range(5):
         copy_into(c.cone[r], rows.cone[r])
-        rows.bound[r] = c.largest[0] if r == 4 else 0.0
+        rows.bound[r] = c.largest if r == 4 else 0.0
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,8 @@ class PointContact(Contact[PointContactBlock]):
         return PointContactBlock(
             point=body_point(robot, self.body, self.point), normal=normal,
             cone=force_cone(normal, self.friction),
-            force=np.array([self.force * units.force]),
-            largest=np.array([self.largest_force * units.force]),
+            force=float(self.force * units.force),
+            largest=float(self.largest_force * units.force),
             force_weight=float(self.force_weight / units.force**2),
             damping=float(self.damping * units.omega),
         )  # fmt: skip
@@ -94,9 +95,9 @@ class PointContact(Contact[PointContactBlock]):
             J=motion.J[:3],
             accel=-block.damping * motion.J_v[:3] - motion.Jdot_v[:3],
             cone=block.cone,
-            bound=np.array([0.0, 0.0, 0.0, 0.0, block.largest[0]]),
+            bound=np.array([0.0, 0.0, 0.0, 0.0, block.largest]),
             weights=np.full(3, block.force_weight),
-            force=block.force[0] * block.normal,
+            force=block.force * block.normal,
         )
 
 

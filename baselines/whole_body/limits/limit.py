@@ -7,6 +7,7 @@ from typing import ClassVar, Generic, NamedTuple
 import numpy as np
 
 from poise.baselines.whole_body.parts.part import B, Part
+from poise.baselines.whole_body.parts.reduced_motion import ReducedMotion
 from poise.envs.compiled.block import Block
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -29,16 +30,6 @@ class BoundArrays(Block):
     C: np.ndarray  # (k, n)
     l: np.ndarray  # noqa: E741  (k,)
     u: np.ndarray  # (k,)
-
-
-@dataclass(frozen=True, eq=False)
-class ReducedMotion(Block):
-    """Accelerations v̇ = V x + v̇₀ and joint torques τ = T x + τ₀ in the reduced unknowns x."""
-
-    V: np.ndarray  # (nv, n)
-    vdot0: np.ndarray  # (nv,)
-    T: np.ndarray  # (nv−6, n)
-    tau0: np.ndarray  # (nv−6,)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ import numpy as np
 from poise.configs.errors import below
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
-from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 B = TypeVar("B", bound=Block)
@@ -40,8 +39,8 @@ class Bound(NamedTuple, Generic[P]):
     part: P
     block: Any
 
-    def rows(self, state: RobotState, *further: np.ndarray) -> Any:
-        """The rows of a state, see `rows` of the part."""
+    def rows(self, state: Any, *further: np.ndarray) -> Any:
+        """The rows of a state, or of what else the part takes, see its `rows`."""
         part: Any = self.part
         return part.rows(state, self.block, *further)
 

@@ -16,10 +16,9 @@ from poise.envs.physics.body_points import (
     standing_frame,
     update_point,
 )
-from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .task import Rows, Task, TaskTick, spring
+from .task import Rows, Task, TaskInput, TaskTick, spring
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +81,8 @@ class Orientation(Task[OrientationBlock]):
             k=k, d=d, weight=float(self.weight / units.omega**4),
         )  # fmt: skip
 
-    def rows(self, state: RobotState, block: OrientationBlock) -> Rows:
+    def rows(self, t: TaskInput, block: OrientationBlock) -> Rows:
+        state = t.state
         motion = point_motion(state, block.point)
         yaw = state.heading_yaw if block.turns else 0.0
         desired = Rotation.from_euler("z", yaw).as_matrix() @ block.axes

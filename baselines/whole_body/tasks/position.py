@@ -16,10 +16,9 @@ from poise.envs.physics.body_points import (
     update_point,
 )
 from poise.envs.physics.legs import standing_data
-from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .task import Rows, Task, TaskTick, spring
+from .task import Rows, Task, TaskInput, TaskTick, spring
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +103,8 @@ class Position(Task[PositionBlock]):
             gravity=units.gravity, k=k, d=d, weight=float(self.weight / units.gravity**2),
         )  # fmt: skip
 
-    def rows(self, state: RobotState, block: PositionBlock) -> Rows:
+    def rows(self, t: TaskInput, block: PositionBlock) -> Rows:
+        state = t.state
         motion = point_motion(state, block.point)
         place, velocity, accel = block.reference
         if block.turns:

@@ -8,9 +8,8 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into, rotation_error
-from poise.envs.physics.state import RobotState
 
-from .task import Rows, Task, TaskTick
+from .task import Rows, Task, TaskInput, TaskTick
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +65,8 @@ class SolePose(Task[SolePoseBlock]):
     size: ClassVar[int] = 6
     kernel = staticmethod(fill_sole_pose)
 
-    def rows(self, state: RobotState, block: SolePoseBlock) -> Rows:
+    def rows(self, t: TaskInput, block: SolePoseBlock) -> Rows:
+        state = t.state
         gains, reference = block.gains, block.reference
         own = slice(6 * block.sole, 6 * block.sole + 6)
         velocity, axes = state.J_v[own], state.sole_axes[block.sole]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.texts import plain
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.clock import Clock
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.mirror import SIDES, Mirror
 
@@ -61,8 +63,8 @@ class View(Block):
     v_ref: np.ndarray  # (nj,) its joint velocities [rad/s]
     action: np.ndarray  # (na,) of the policy step that has just ended
     views: SimViews  # the true robot: what the policy sent it (`ctrl`), what a teacher may see
-    clock: np.ndarray  # (1,) int: physics steps since the reset
-    pushes: np.ndarray  # (k, 11) of the episode, see `pack`; rows of zeros are none
+    clock: Clock
+    pushes: np.ndarray  # (k,) of the episode, see `pack`; rows of zeros are none
     out: np.ndarray  # (size,) the term's own entries
 
 
@@ -193,19 +195,19 @@ def term_table(kinds: Iterable[TermKind]) -> str:
     return "\n".join(rows)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Whole(Block):
     """A whole observation."""
 
     out: np.ndarray  # (no,)
-    first: np.ndarray  # (1,) int: where the newest frame begins
-    steps: np.ndarray  # (1,) int: policy steps since the reset
+    first: int  # where the newest frame begins
+    steps: Mutable[int]  # policy steps since the reset
 
 
 @compiled
 def age(whole: Whole):
     """Every frame becomes a step older, the oldest is forgotten."""
-    out, first = whole.out, whole.first[0]
+    out, first = whole.out, whole.first
     size = out.shape[0] - first
     for i in range(first):
         out[i] = out[i + size]
@@ -214,10 +216,10 @@ def age(whole: Whole):
 @compiled
 def clip(whole: Whole):
     """Every entry into [−10, 10]; an episode begins as if it had long been as it is."""
-    out, first = whole.out, whole.first[0]
+    out, first = whole.out, whole.first
     for i in range(first, out.shape[0]):
         out[i] = min(max(out[i], -CLIP), CLIP)
-    if whole.steps[0] == 0:
+    if whole.steps == 0:
         size = out.shape[0] - first
         for i in range(first - 1, -1, -1):
             out[i] = out[i + size]
@@ -232,16 +234,16 @@ def frames(terms: Sequence[Term], history: int) -> list[Term]:
 def observer(
     terms: Iterable[Term],
     out: np.ndarray,
-    steps: np.ndarray,
+    steps: Any,
     view: Callable[[type[Block], np.ndarray], Block],
 ) -> list[tuple[Callable[..., None], Block]]:
     """What fills the end of `out` (no,) with `terms`; before them lie older frames.
 
-    `steps` (1,) are the policy steps since the reset; `view(kind, out)` makes the terms' blocks.
+    `steps` (1,) holds the policy steps since the reset; `view(kind, out)` makes the terms' blocks.
     """
     terms = list(terms)
     first = len(out) - sum(term.size for term in terms)
-    whole = Whole(out, np.array([first]), steps)
+    whole = Whole(out, first, steps)
     calls: list[tuple[Callable[..., None], Block]] = [(age, whole)] if first else []
     for term in terms:
         assert term.kernel is not None  # those of actions are not observed

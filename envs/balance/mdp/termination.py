@@ -83,7 +83,7 @@ def uprightness(robot: RobotArrays, s: StateArrays) -> float:
 def has_fallen(robot: RobotArrays, s: StateArrays, limits: Limits) -> bool:
     """CoM too low, root tilted too far, or more than the feet on the ground."""
     low = s.com[2] - s.origin[2] < limits.height
-    touching = limits.ground_contact and s.other_contacts[0] > 0.5
+    touching = limits.ground_contact and s.other_contacts > 0.5
     # not np.isfinite(x + y): x + y − (x + y), reordered, is 0 for NaN too
     finite = abs(s.com[2]) < np.inf and abs(s.com_vel[2]) < np.inf
     return low or uprightness(robot, s) < limits.cos_tilt or touching or not finite

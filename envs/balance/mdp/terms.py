@@ -12,8 +12,9 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.kinematics import StateArrays
-from poise.envs.physics.pushes.table import DURATION, FORCE, HALF_SINE, KIND, PROFILE, PUSH, START
+from poise.envs.physics.pushes.table import HALF_SINE, PUSH
 from poise.envs.sensing.measurement import Rings, arrived
 
 from .observation import GROUND, SPACE, Terms, View
@@ -135,27 +136,27 @@ def friction(v: View):
 
 @TERMS.add(SPACE, "m g", "force that pushes now: a teacher's privilege", "vector", default=False)
 def push(v: View):
-    now = v.clock[0] * v.robot.timestep
+    now = v.clock.steps * v.robot.timestep
     v.out[:] = 0.0
     for k in range(v.pushes.shape[0]):
         row = v.pushes[k]
-        age, duration = now - row[START], row[DURATION]
-        if row[KIND] == PUSH and 0.0 <= age < duration:
-            fraction = np.sin(np.pi * age / duration) if row[PROFILE] == HALF_SINE else 1.0
+        age, duration, force = now - row.start, row.duration, row.force
+        if row.kind == PUSH and 0.0 <= age < duration:
+            fraction = np.sin(np.pi * age / duration) if row.profile == HALF_SINE else 1.0
             for a in range(3):
-                v.out[a] += fraction * row[FORCE + a]
+                v.out[a] += fraction * force[a]
     put_local(v.state, v.out[0], v.out[1], v.scales.weight, v.out)
     v.out[2] /= v.scales.weight
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class MeasuredView(Block):
     """The block of a term of what sensors measure, as late and as noisy as it is: nothing is
     estimated. Where nothing errs and nothing is late, it is what the state says."""
 
     seen: View
     rings: Rings
-    late: np.ndarray  # (≥ 1,) int: physics steps by which measurements are late
+    late: Mutable[int]  # physics steps by which measurements are late
     ideal: bool  # nothing is measured
 
 
@@ -166,7 +167,7 @@ MEASURED_TERMS = Terms(view=MeasuredView)  #: by name
     SPACE, "1", "direction of gravity by the IMU, its axes", "root vector", default=False
 )
 def measured_gravity(m: MeasuredView):
-    row = arrived(m.rings, m.late[0])
+    row = arrived(m.rings, m.late)
     for a in range(3):
         up = m.seen.state.root_axes[2, a] if m.ideal else m.rings.attitude[row, 2, a]
         m.seen.out[a] = -up
@@ -174,7 +175,7 @@ def measured_gravity(m: MeasuredView):
 
 @MEASURED_TERMS.add(SPACE, "ω", "angular velocity by the gyro", "root turn", default=False)
 def measured_rate(m: MeasuredView):
-    row = arrived(m.rings, m.late[0])
+    row = arrived(m.rings, m.late)
     for a in range(3):
         rate = m.seen.state.qvel[3 + a] if m.ideal else m.rings.gyro[row, a]
         m.seen.out[a] = rate / m.seen.scales.omega
@@ -185,7 +186,7 @@ def measured_rate(m: MeasuredView):
     default=False,
 )  # fmt: skip
 def measured_joint_pos(m: MeasuredView):
-    v, row = m.seen, arrived(m.rings, m.late[0])
+    v, row = m.seen, arrived(m.rings, m.late)
     for j in range(v.out.shape[0]):
         v.out[j] = (v.state.qpos[7 + j] if m.ideal else m.rings.q[row, j]) - v.q_ref[j]
 
@@ -195,7 +196,7 @@ def measured_joint_pos(m: MeasuredView):
     default=False,
 )  # fmt: skip
 def measured_joint_vel(m: MeasuredView):
-    v, row = m.seen, arrived(m.rings, m.late[0])
+    v, row = m.seen, arrived(m.rings, m.late)
     for j in range(v.out.shape[0]):
         rate = v.state.qvel[6 + j] if m.ideal else m.rings.dq[row, j]
         v.out[j] = (rate - v.v_ref[j]) / (3.0 * v.scales.omega)

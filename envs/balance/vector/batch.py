@@ -13,11 +13,10 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import real_array, whole_number
 from poise.envs.balance.action import BEYOND
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import TERMINATED, EpisodeArrays
 from poise.envs.compiled.calls import CompiledStep
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.memory import guarded_zeros
 
+from .rows import in_rows
 from .scheduler import NOTHING, StepSchedule
 from .threads import ThreadTeam
 
@@ -51,14 +50,9 @@ class EnvBatch(Copyable):
         # a window is drawn to from one thread only
         self.threads = 1 if first.render_mode == "human" else max(1, min(threads, n))
         # the environments' own records become rows of these, so that nothing is gathered by hand
-        self.episodes = EpisodeArrays(
-            *(guarded_zeros((n, *array.shape)) for array in first.episode.members())
-        )
-        for i, env in enumerate(self.envs):
-            rows = [array[i] for array in self.episodes.members()]
-            for row, own in zip(rows, env.episode.members(), strict=True):
-                row[...] = own
-            env.episode = EpisodeArrays(*rows)
+        self.episodes, rows = in_rows([env.episode for env in self.envs])
+        for env, row in zip(self.envs, rows, strict=True):
+            env.episode = row
         self.observations = np.zeros((n, *first.observation_space.shape), dtype=np.float32)
         self.final_observations = self.observations
         self.rewards = np.zeros(n)
@@ -116,7 +110,7 @@ class EnvBatch(Copyable):
             for i in ended:
                 at_end(int(i), self.envs[i])
         self._share(self._restart, ended)
-        self.observations = self.episodes.observation.astype(np.float32)
+        self.observations = self.episodes["observation"].astype(np.float32)
 
     def advance(self, actions: np.ndarray, restart: np.ndarray | None = None) -> None:
         """Take a policy step of all but those of `restart` (n,), which start an episode instead.
@@ -133,7 +127,7 @@ class EnvBatch(Copyable):
         if restart is not None and restart.any():
             live, restarted = ~restart, np.flatnonzero(restart).tolist()
             stepped = np.flatnonzero(live).tolist()
-        if not record.running[live].all():
+        if not record["running"][live].all():
             for env in np.array(self.envs, dtype=object)[live]:
                 env.expect_running()  # raises
         self._set_actions(actions, live)
@@ -154,10 +148,10 @@ class EnvBatch(Copyable):
     def _report(self) -> None:
         """Copy what the records say; the record of a new episode is empty."""
         record = self.episodes
-        self.observations = record.observation.astype(np.float32)
-        self.rewards = record.reward[:, 0].copy()
-        self.terminated = record.metrics[:, TERMINATED] != 0.0
-        self.truncated = (record.running[:, 0] == 0) & ~self.terminated
+        self.observations = record["observation"].astype(np.float32)
+        self.rewards = record["reward"].copy()
+        self.terminated = record["metrics"]["terminated"] != 0.0
+        self.truncated = (record["running"] == 0) & ~self.terminated
 
     def _compiled_steps(self, stepped: Sequence[int]) -> StepSchedule | None:
         """Return the schedule of the steps of `stepped`; None if Python has to take them."""
@@ -178,9 +172,9 @@ class EnvBatch(Copyable):
         vectors = real_array(actions)
         if vectors is None:
             raise ConfigError(f"must be numbers, not {shown(actions)}", field="action")
-        if vectors.shape != record.action.shape:
+        if vectors.shape != record["action"].shape:
             raise ConfigError(
-                f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
+                f"has shape {vectors.shape}, expected {record['action'].shape}", field="action"
             )
         vectors = vectors[live].astype(float, copy=False)
         if self.envs[0].config.clip_action:
@@ -189,8 +183,8 @@ class EnvBatch(Copyable):
         if not good.all():
             for env, vector in zip(np.array(self.envs, dtype=object)[live], vectors, strict=True):
                 env.check_action(vector)  # raises, and names the entries
-        record.last_action[live] = record.action[live]
-        record.action[live] = np.minimum(np.maximum(vectors, -1.0), 1.0)
+        record["last_action"][live] = record["action"][live]
+        record["action"][live] = np.minimum(np.maximum(vectors, -1.0), 1.0)
 
     def _restart(
         self, i: int, seed: int | None = None, options: dict[str, object] | None = None

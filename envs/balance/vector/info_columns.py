@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import FAILURES, QUIET_STEPS, SATURATED, TICKS, EpisodeArrays
 from poise.envs.balance.mdp.reward import REWARD_TERMS
 from poise.envs.compiled.copies import Copyable
 
@@ -17,7 +16,7 @@ class InfoColumns(Copyable):
     `record` holds their rows. The lists of pushes are the same ones until the next episode.
     """
 
-    def __init__(self, envs: Sequence[BalanceEnv], record: EpisodeArrays):
+    def __init__(self, envs: Sequence[BalanceEnv], record: dict[str, Any]):
         self.envs, self.record = envs, record
         self._quiet_steps = np.array([env.quiet_steps for env in envs])
         self._pushes: list[object] = [None] * len(envs)  # those described
@@ -25,16 +24,16 @@ class InfoColumns(Copyable):
 
     def read(self) -> dict[str, Any]:
         """The columns (n,) of the last step: "push" of lists, "root_wrench" (n, 6)."""
-        record, metrics = self.record, self.record.metrics
+        record, metrics = self.record, self.record["metrics"]
         for i, env in enumerate(self.envs):
             pushes = env.simulation.pushes
             if pushes is not self._pushes[i]:
                 self._pushes[i], self._descriptions[i] = pushes, env.push_infos()
         return {
-            "reward_terms": dict(zip(REWARD_TERMS, record.reward_terms.T.copy(), strict=True)),
+            "reward_terms": dict(zip(REWARD_TERMS, record["reward_terms"].T.copy(), strict=True)),
             "push": self._descriptions.copy(),
-            "is_success": metrics[:, QUIET_STEPS] >= self._quiet_steps,
-            "solver_failures": metrics[:, FAILURES].astype(int),
-            "torque_saturation": metrics[:, SATURATED] / np.maximum(metrics[:, TICKS], 1.0),
-            "root_wrench": record.root_wrench.copy(),
+            "is_success": metrics["quiet_steps"] >= self._quiet_steps,
+            "solver_failures": metrics["failures"].astype(int),
+            "torque_saturation": metrics["saturated"] / np.maximum(metrics["ticks"], 1.0),
+            "root_wrench": record["root_wrench"].copy(),
         }

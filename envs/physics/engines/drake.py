@@ -10,7 +10,7 @@ from poise.envs.robots.robot import Robot
 
 from .config import Physics
 from .engine import Engine
-from .geometry import rotation
+from .geometry import rotation_of
 from .held import check_held
 
 if TYPE_CHECKING:
@@ -66,7 +66,9 @@ class DrakeEngine(Engine):
         self._callback.check()
         plant, d = self._current(), self.data
         plant.write(d.qpos, d.qvel)
-        plant.step(plant.to_drake(rotation(d.qpos[3:7]), self._forces() + self._friction(d.qvel)))
+        plant.step(
+            plant.to_drake(rotation_of(d.qpos[3:7]), self._forces() + self._friction(d.qvel))
+        )
         wrench, bodies = plant.contacts()
         self._tell(wrench, bodies, d.qpos)
 
@@ -94,7 +96,7 @@ class DrakeEngine(Engine):
                 d.warning[DIVERGED].number += 1
                 return
             plant.write(d.qpos, d.qvel)
-            given = plant.to_drake(rotation(d.qpos[3:7]), forces + self._friction(d.qvel))
+            given = plant.to_drake(rotation_of(d.qpos[3:7]), forces + self._friction(d.qvel))
             try:
                 values = plant.step(given)
             except RuntimeError as error:  # numbers so large that its solver finds no solution
@@ -133,7 +135,7 @@ class DrakeEngine(Engine):
         d, root = self.data, qpos[:3]
         d.qfrc_constraint[:3] = wrench[:3]
         moment = wrench[3:] - np.cross(root, wrench[:3])
-        d.qfrc_constraint[3:6] = rotation(qpos[3:7]).T @ moment
+        d.qfrc_constraint[3:6] = rotation_of(qpos[3:7]).T @ moment
         for name, own in self._feet.items():
             d.sensordata[self.robot.sensor_adr[name]] = sum(body in own for body in bodies)
         d.sensordata[self.robot.sensor_adr["ground"]] = len(bodies)

@@ -42,7 +42,7 @@ from poise.envs.robots.ground import pair_friction
 from poise.envs.robots.robot import Robot
 
 from .config import Physics
-from .geometry import GEOM, ground_points, mesh_vertices, rotation, touching_pairs
+from .geometry import GEOM, ground_points, mesh_vertices, rotation_of, touching_pairs
 
 POINT = 1e-6  # [m] radius of a ball that stands for a corner
 SLIPPERY, ROUGH = 1e-9, 1e9  # friction: Drake takes the harmonic mean, 2 μ₁ μ₂/(μ₁ + μ₂)
@@ -154,7 +154,7 @@ class DrakePlant:
         model = self.robot.model
         if model.body_mass[body] == 0.0:
             return SpatialInertia.Zero()
-        axes = rotation(model.body_iquat[body])
+        axes = rotation_of(model.body_iquat[body])
         own = axes @ np.diag(model.body_inertia[body]) @ axes.T
         moments = RotationalInertia(*own[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
         try:
@@ -237,7 +237,7 @@ class DrakePlant:
         return q
 
     def _velocities(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
-        return self.to_drake(rotation(qpos[3:7]), qvel)
+        return self.to_drake(rotation_of(qpos[3:7]), qvel)
 
     def to_drake(self, root_axes: np.ndarray, vector: np.ndarray) -> np.ndarray:
         """Velocities, or generalised forces, (nv,) in Drake's order and axes of the root."""
@@ -262,7 +262,7 @@ class DrakePlant:
         mujoco.mju_normalize4(qpos[3:7])
         qpos[7:] = q[self.qpos] + self._reference
         n = self._root_v
-        qvel[:3], qvel[3:6] = v[n + 3 : n + 6], rotation(qpos[3:7]).T @ v[n : n + 3]
+        qvel[:3], qvel[3:6] = v[n + 3 : n + 6], rotation_of(qpos[3:7]).T @ v[n : n + 3]
         qvel[6:] = v[self.qvel]
 
     def contacts(self) -> tuple[np.ndarray, list[int]]:
@@ -294,7 +294,7 @@ def _silenced(logger: str) -> Iterator[None]:
 
 
 def _transform(position: np.ndarray, quaternion: np.ndarray) -> RigidTransform:
-    return RigidTransform(RotationMatrix(rotation(quaternion)), np.array(position))
+    return RigidTransform(RotationMatrix(rotation_of(quaternion)), np.array(position))
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> Any:

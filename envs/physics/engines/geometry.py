@@ -43,7 +43,7 @@ def ground_points(robot: Robot) -> Iterator[GroundPoints]:
         if model.body_weldid[body] == 0 or not can_touch(model, geom, ground):
             continue
         local, radius = _extremes(model, geom)
-        points = model.geom_pos[geom] + local @ rotation(model.geom_quat[geom]).T
+        points = model.geom_pos[geom] + local @ rotation_of(model.geom_quat[geom]).T
         for sole in robot.soles:  # that its corners are among them
             if geom in sole.geom_ids and GEOM(int(model.geom_type[geom])) in ROUGHLY:
                 flat = np.column_stack([sole.polygon, np.zeros(len(sole.polygon))])
@@ -80,7 +80,7 @@ def touching_pairs(robot: Robot) -> list[tuple[int, int]]:
     return found
 
 
-def rotation(quaternion: np.ndarray) -> np.ndarray:
+def rotation_of(quaternion: np.ndarray) -> np.ndarray:
     """(3, 3) of a quaternion w x y z."""
     axes = np.zeros(9)
     mujoco.mju_quat2Mat(axes, np.asarray(quaternion, dtype=float))

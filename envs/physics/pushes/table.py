@@ -9,35 +9,42 @@ from poise.envs.robots.robot import Robot
 
 from .push import Kick, Push, unit_vector
 
-# columns; of a force and a point three each
-BODY, START, DURATION, FORCE, POINT, PROFILE, KIND = 0, 1, 2, 3, 6, 9, 10
-TABLE_COLUMNS = 11
-NOTHING, PUSH, KICK = 0.0, 1.0, 2.0  # kinds; a row of zeros is no push
-SQUARE, HALF_SINE = 0.0, 1.0  # profiles
+NOTHING, PUSH, KICK = 0, 1, 2  # kinds; a row of zeros is no push
+SQUARE, HALF_SINE = 0, 1  # profiles
+ROW = np.dtype(
+    [
+        ("kind", np.int64),
+        ("body", np.int64),
+        ("start", float),  # [s]
+        ("duration", float),  # [s]
+        ("force", float, 3),  # peak, world axes [N]; of a kick the change of velocity [m/s]
+        ("point", float, 3),  # in the body's frame [m]
+        ("profile", np.int64),
+    ],
+    align=True,
+)
 
 
 def pack(pushes: Sequence[Push | Kick], robot: Robot, heading_yaw: float) -> np.ndarray:
-    """Table (k, 11) for the compiled kernels, one row per push.
+    """Table (k,) of `ROW` for the compiled kernels, one row per push.
 
-    Columns: body id, start [s], duration [s], peak world force x y z [N] (of a kick: world Δv
-    [m/s]), point x y z in the body frame [m], profile, kind. `heading_yaw` [rad] is the yaw of the
-    heading frame at the reset.
+    `heading_yaw` [rad] is the yaw of the heading frame at the reset.
     """
-    table = np.zeros((len(pushes), TABLE_COLUMNS))
+    table = np.zeros(len(pushes), ROW)
     cos, sin = np.cos(heading_yaw), np.sin(heading_yaw)
     to_world = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     for row, push in zip(table, pushes, strict=True):
-        row[START] = push.start
+        row["start"] = push.start
         if isinstance(push, Kick):
-            row[BODY], row[KIND] = robot.root_body_id, KICK
-            row[FORCE : FORCE + 3] = push.delta_v * to_world @ unit_vector(push.direction)
+            row["body"], row["kind"] = robot.root_body_id, KICK
+            row["force"] = push.delta_v * to_world @ unit_vector(push.direction)
         else:
-            row[BODY], row[KIND] = robot.model.body(push.body).id, PUSH
-            row[DURATION] = push.duration
+            row["body"], row["kind"] = robot.model.body(push.body).id, PUSH
+            row["duration"] = push.duration
             direction = unit_vector(push.direction, push.elevation)
-            row[FORCE : FORCE + 3] = push.peak_force * to_world @ direction
-            row[POINT : POINT + 3] = push.point
-            row[PROFILE] = HALF_SINE if push.profile == "half-sine" else SQUARE
+            row["force"] = push.peak_force * to_world @ direction
+            row["point"] = push.point
+            row["profile"] = HALF_SINE if push.profile == "half-sine" else SQUARE
     return table
 
 
@@ -53,26 +60,26 @@ def apply_pushes(
     """
     for k in range(table.shape[0]):
         push = table[k]
-        if push[KIND] != PUSH:
+        if push.kind != PUSH:
             continue
-        start, duration = push[START], push[DURATION]
+        start, duration = push.start, push.duration
         begin = max(t, start) - start
         end = min(t + dt, start + duration) - start
         if end <= begin:
             continue
-        if push[PROFILE] == SQUARE:
+        if push.profile == SQUARE:
             fraction = (end - begin) / dt
         else:
             rate = np.pi / duration
             fraction = (np.cos(rate * begin) - np.cos(rate * end)) / (rate * dt)
-        body = int(push[BODY])
-        fx, fy, fz = fraction * push[FORCE], fraction * push[FORCE + 1], fraction * push[FORCE + 2]
-        px, py, pz = push[POINT], push[POINT + 1], push[POINT + 2]
-        R = xmat[body]
+        force, point = push.force, push.point
+        fx, fy, fz = fraction * force[0], fraction * force[1], fraction * force[2]
+        px, py, pz = point[0], point[1], point[2]
+        R = xmat[push.body]
         rx = R[0] * px + R[1] * py + R[2] * pz
         ry = R[3] * px + R[4] * py + R[5] * pz
         rz = R[6] * px + R[7] * py + R[8] * pz
-        wrench = xfrc_applied[body]
+        wrench = xfrc_applied[push.body]
         wrench[0] += fx
         wrench[1] += fy
         wrench[2] += fz
@@ -90,6 +97,8 @@ def apply_kicks(table: np.ndarray, t: float, dt: float, qvel: np.ndarray):
     """
     step = np.rint(t / dt)
     for k in range(table.shape[0]):
-        if table[k, KIND] == KICK and np.floor(table[k, START] / dt + 1e-6) == step:
+        kick = table[k]
+        if kick.kind == KICK and np.floor(kick.start / dt + 1e-6) == step:
+            change = kick.force
             for a in range(3):
-                qvel[a] += table[k, FORCE + a]
+                qvel[a] += change[a]

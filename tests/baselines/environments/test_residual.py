@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.targets import motion_arrays, update_targets
+from poise.baselines.balance.references.targets import motion_arrays, no_offsets, update_targets
 from poise.baselines.controller import Targets
 from poise.baselines.environments.policy_step import gate_opening
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.whole_body.gains import CoMTask, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP
+from poise.baselines.whole_body.tasks.com import CoM
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import EnvConfig
 from poise.envs.balance.mdp.reward import RewardWeights
@@ -48,7 +49,7 @@ def test_action_zero_is_the_controller_alone(motion):
     controller.reset(state)
     m = load_motion(motion, robot())
     reference = motion_arrays(m)
-    targets, none = Targets.standing(robot(), state), np.zeros(len(env._offsets))
+    targets, none = Targets.standing(robot(), state), no_offsets()
     count = round(controller.period / robot().model.opt.timestep)
     for _ in range(40):
         env.step(zero(env))
@@ -269,18 +270,18 @@ def test_a_soft_root_is_reported():
         *_, info = env.step(zero(env))
         largest = max(largest, np.abs(info["root_wrench"]).max())
     assert largest > 1.0
-    compiled = env.episode.metrics.copy()
+    compiled = env.episode.metrics.mutable_values()
     env._compiled = False  # the same in Python
     env.reset(seed=0, options={"push": {**PUSH, "impulse": 25.0, "start": 0.0}})
     for _ in range(10):
         env.step(zero(env))
-    np.testing.assert_allclose(env.episode.metrics, compiled, rtol=1e-9)
+    assert env.episode.metrics.mutable_values() == pytest.approx(compiled, rel=1e-9)
 
 
 def test_failures_of_the_solver_are_counted_per_episode(env):
     """info says how often the QP was not solved since the reset."""
     env.reset(seed=0)
-    env.controller.memory.failures[0] = 3
+    env.controller.memory.failures = 3
     assert env.step(zero(env))[4]["solver_failures"] >= 3
     assert env.reset(seed=0)[1]["solver_failures"] == 0
 
@@ -323,7 +324,9 @@ def test_smoothing_is_a_first_order_lag():
         env.step(action)
         expected += (1.0 - np.exp(-0.02 / 0.05)) * (action - expected)
         np.testing.assert_allclose(env.episode.action, expected, rtol=1e-12)
-        np.testing.assert_allclose(env._offsets[:4], expected * [0.2, 0.2, 0.15, 0.15], rtol=1e-12)
+        np.testing.assert_allclose(
+            env._offsets.values[:4], expected * [0.2, 0.2, 0.15, 0.15], rtol=1e-12
+        )
 
 
 def test_the_gate_opens_with_the_capture_point():
@@ -355,7 +358,7 @@ def test_a_replica_acts_alike(changes):
 
 def test_a_controller_may_be_replaced(env):
     """Its offset, gains and period count from then on, as if the environment were made with it."""
-    config = MomentumQPConfig(com=CoMTask(offset=0.03), period=0.01)
+    config = MomentumQPConfig(com=CoM(offset=0.03), period=0.01)
     env.reset(seed=0)
     env.step(zero(env))
     env.controller = MomentumQP(robot(), config)
@@ -375,7 +378,7 @@ def test_failures_and_the_root_wrench_are_reported(solver):
     config = replace(controller_config("momentum-qp"), root="soft", solver=solver)
     env = ResidualBalanceEnv(robot(), controller=config, pushes=None)
     env.reset(seed=0)
-    env.controller.memory.failures[0] = 3
+    env.controller.memory.failures = 3
     info = env.step(zero(env))[-1]
     assert info["solver_failures"] == 3
     assert np.array_equal(info["root_wrench"], env.controller.root_wrench)

@@ -69,7 +69,9 @@ def test_compiled_steps_are_those_of_python(controller):
         action = {"com_x": 0.2, "foothold_y": 0.3, "time": -0.2, "lean_y": 0.1, "trigger": -0.1}
         play(env, action, until=lambda env, r=rows: r.append(env.episode.observation.copy()))
         e, qpos = env.episode, env.simulation.data.qpos.copy()
-        ends.append([np.array(rows), e.reward_terms.copy(), e.metrics.copy(), qpos])
+        ends.append(
+            [np.array(rows), e.reward_terms.copy(), [*e.metrics.mutable_values().values()], qpos]
+        )
         assert env.controller.steps >= 1 and len(rows) > 10
     for one, other in zip(*ends, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
@@ -130,10 +132,10 @@ def test_the_time_of_a_step_moves_by_what_is_added_once(env, sign):
     ends = []
     for value in (0.0, sign):
         play(env, {"time": 0.5 * value}, until=swinging)
-        duration = env.controller.swing.duration[0]
+        duration = env.controller.swing.duration
         for _ in range(3):
             env.step_without_info(env.episode.action.copy())
-        ends.append((duration, env.controller.swing.duration[0]))
+        ends.append((duration, env.controller.swing.duration))
     first, later = np.diff(ends, axis=0)[0]
     assert first == pytest.approx(sign * 0.5 * ALL.time, abs=1e-9)
     assert later == pytest.approx(sign * 0.5 * ALL.time, abs=0.03)
@@ -171,7 +173,7 @@ def test_rest_after_a_step_is_moved(env):
     anywhere = 9.0 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     tick, seen = controller.tick(state, env.targets), []
     for shift in ([0.0, 0.0], [0.1, -0.05]):
-        controller.offsets.com = shift
+        controller.offsets.com[:] = shift
         copy_reference(tick)
         guide_com(tick, anywhere, 0.0, 0.0, 0.0, 0.0)
         seen.append(tick.reference_out.com_acc[:2].copy())
@@ -184,12 +186,12 @@ def test_observation_tells_of_the_step():
     """Terms of the step against the controller, in a swing and with both feet down."""
     env = ResidualStepEnv(robot(), duration=1.2)
     names = [f"{term.name}.{entry}" for term in env.terms for entry in term.entries]
-    play(env, until=lambda env: swinging(env) and env.controller.swing.time[0] > 0.1)
+    play(env, until=lambda env: swinging(env) and env.controller.swing.time > 0.1)
     seen = dict(zip(names, env.episode.observation, strict=True))
     controller, state = env.controller, env.simulation.state
     assert [seen["swing.left"], seen["swing.right"]] == [controller.foot == 0, controller.foot == 1]
     assert seen["phase.fraction"] == pytest.approx(
-        controller.swing.time[0] / controller.swing.duration[0]
+        controller.swing.time / controller.swing.duration
     )
     assert seen["steps.count"] == 1.0 and seen["time_left.t"] > 0.0
     cos, sin = state.heading

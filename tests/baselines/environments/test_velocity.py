@@ -8,6 +8,7 @@ from poise.baselines.environments.velocity_terms import MEAN_TIME
 from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.vector.batch import EnvBatch, replicate
+from poise.envs.physics.pushes.push import Kick
 from tests.support.shared import robot
 
 REST = {"pushes": None, "duration": 2.0}
@@ -144,14 +145,15 @@ def test_commands_are_drawn():
     assert abs(one * 0.2 * env.scales.omega).max() <= 1.0
 
 
-def test_it_is_recovered_while_it_follows():
-    """Standing is no success where it is to walk, and one where it is not."""
+def test_success_is_not_to_fall():
+    """As in the benchmark of walks: what is off its command has not failed, what falls has."""
     env = VelocityEnv(robot(), pushes=None, duration=2.0)
-    for ahead, well in ((0.0, True), (0.09, True), (0.5, False)):
-        env.reset(seed=0, options={"command": {"ahead": ahead}})
-        while env.episode.running[0]:
+    for ahead, kick, well in ((0.0, 0.0, True), (0.5, 0.0, True), (0.5, 4.0, False)):
+        pushes = {"push": Kick(0.2, kick, 90.0)} if kick else {}
+        env.reset(seed=0, options={"command": {"ahead": ahead}, **pushes})
+        while env.episode.running:
             env.step_without_info(np.zeros(env.action_space.shape))
-        assert env.recovered == well, ahead
+        assert env.recovered == well == (not env.fallen), ahead
 
 
 def test_threads_change_nothing():

@@ -13,7 +13,6 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import ConfigError
-from poise.envs.balance.episode import FAILURES
 from poise.envs.balance.vector.batch import EnvBatch, replicate
 from poise.envs.sensing.realism import load_realism
 from tests.support.shared import robot
@@ -43,7 +42,7 @@ def track(env, action, steps=50, push=PUSH):
     for _ in range(steps):
         env.step_without_info(action)
         rows.append(np.concatenate([env.data.qpos, env.data.qvel, env.data.ctrl]))
-        if not env.episode.running[0]:
+        if not env.episode.running:
             break
     return np.array(rows)
 
@@ -124,9 +123,9 @@ def test_the_controller_takes_back_once_calm():
 
     controller.reset = counted
     env.reset(seed=3, options={"noise": 0.0, "push": {**PUSH, "impulse": 8.0, "direction": 90.0}})
-    controller.outputs().failures[0] = 5
+    controller.outputs().failures = 5
     shares = []
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(with_authority(env, 1.0))
         shares.append(env.authority)
     changes = np.flatnonzero(np.diff(shares))
@@ -134,7 +133,7 @@ def test_the_controller_takes_back_once_calm():
     assert begun == [0, changes[1] + 1]
     calm = env.hand_over.calm_time / env.config.policy_period
     assert changes[1] - changes[0] >= calm
-    assert env.episode.metrics[FAILURES] == 5
+    assert env.episode.metrics.failures == 5
 
 
 def test_an_error_in_beginning_anew_is_raised(env):

@@ -12,7 +12,7 @@ import pytest
 import torch
 
 import poise
-from poise.baselines.policy_files.config import Memory, ObservationTerm, PolicyFileConfig
+from poise.baselines.policy_files.config import NetworkMemory, ObservationTerm, PolicyFileConfig
 from poise.baselines.policy_files.networks import load_network
 from poise.baselines.policy_files.script_sizes import script_sizes
 from poise.configs.errors import ConfigError, PoiseError
@@ -36,13 +36,13 @@ def test_a_recurrent_network_starts_from_zeros(tmp_path: Path) -> None:
     ("names", "said"),
     [
         (("input_hidden", "output_hidden"), ()),
-        (("h0", "hn"), (Memory("h0", "hn"),)),
-        (("h0", "hn"), (Memory("h0", 1),)),
+        (("h0", "hn"), (NetworkMemory("h0", "hn"),)),
+        (("h0", "hn"), (NetworkMemory("h0", 1),)),
     ],
 )
 @pytest.mark.parametrize("optional", [False, True])
 def test_a_memory_has_any_name(
-    tmp_path: Path, names: tuple[str, str], said: tuple[Memory, ...], optional: bool
+    tmp_path: Path, names: tuple[str, str], said: tuple[NetworkMemory, ...], optional: bool
 ) -> None:
     """And its zeros may be the file's own, so that the input may be left out."""
     path = write_recurrent(tmp_path / "policy.onnx", 2, names, optional)
@@ -86,10 +86,16 @@ def test_inputs_and_outputs_by_name(tmp_path: Path, types: tuple[int, int]) -> N
             {"observations": {"a": TERM, "b": TERM, "c": TERM}},
             "has no such input: 'c' .choices: a, b",
         ),
-        ({"memory": (Memory("h", "kp"),)}, r"memory\[0\].input: two.onnx has no input 'h'"),
-        ({"memory": (Memory("b", "hn"),)}, r"memory\[0\].output: two.onnx has no output 'hn'"),
-        ({"memory": (Memory("b", 3),)}, "has no output 3 .choices: kp, kd, target"),
-        ({"memory": (Memory("b", "kd"),), "outputs": {"action": "q"}}, "outputs.action: .*'q'"),
+        ({"memory": (NetworkMemory("h", "kp"),)}, r"memory\[0\].input: two.onnx has no input 'h'"),
+        (
+            {"memory": (NetworkMemory("b", "hn"),)},
+            r"memory\[0\].output: two.onnx has no output 'hn'",
+        ),
+        ({"memory": (NetworkMemory("b", 3),)}, "has no output 3 .choices: kp, kd, target"),
+        (
+            {"memory": (NetworkMemory("b", "kd"),), "outputs": {"action": "q"}},
+            "outputs.action: .*'q'",
+        ),
     ],
 )
 def test_what_is_not_said_of_a_network(
@@ -139,7 +145,9 @@ def test_torchscript_with_memory(tmp_path: Path) -> None:
     """Given behind the observation, taken from a place among what comes back; in its own type."""
     path = tmp_path / "policy.pt"
     torch.jit.save(torch.jit.script(Remembering()), str(path))
-    config = PolicyFileConfig(memory=(Memory("h", 2, (2,)),), outputs={"stiffness": 1}, batch=False)
+    config = PolicyFileConfig(
+        memory=(NetworkMemory("h", 2, (2,)),), outputs={"stiffness": 1}, batch=False
+    )
     with poise.allowing(str(path)):
         network = load_network(path, config)
         assert script_sizes(path) == (3, 2)
@@ -150,7 +158,7 @@ def test_torchscript_with_memory(tmp_path: Path) -> None:
     network.reset()
     assert network.act(SEEN)["action"][0] == 10.0
     with pytest.raises(ConfigError, match=r"memory\[0\].shape: needs a shape"):
-        load_network(path, PolicyFileConfig(memory=(Memory("h", 2),)))
+        load_network(path, PolicyFileConfig(memory=(NetworkMemory("h", 2),)))
 
 
 class Recurrent(torch.nn.Module):

@@ -9,7 +9,6 @@ from poise.baselines.walking.config import TreadConfig
 from poise.baselines.walking.given import given_footholds
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.errors import ConfigError
-from poise.envs.balance.episode import EDGE_CONTACTS
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain
 from poise.envs.terrain.flat import Flat
@@ -35,7 +34,7 @@ def over(env, terrain, *commands, seed=0):
         env.controller.command = command
         for _ in range(round(seconds / 0.02)):
             env.step_without_info(action)
-            before, swinging = swinging, bool(env.controller.memory.swinging[0])
+            before, swinging = swinging, bool(env.controller.memory.swinging)
             if before and not swinging:
                 foot = env.controller.foot
                 landed.append(env.simulation.state.sole_points[foot].copy())
@@ -48,7 +47,7 @@ def over(env, terrain, *commands, seed=0):
 def test_stairs_are_walked_foot_over_foot_each_sole_on_its_tread(env, down):
     stairs = Stairs(count=4, down=down)
     landed = over(env, stairs, (6.5, WALK))
-    assert not env.fallen and env.episode.metrics[EDGE_CONTACTS] == 0.0
+    assert not env.fallen and env.episode.metrics.edge_contacts == 0.0
     assert env.simulation.state.support_height == pytest.approx(-0.4 if down else 0.4, abs=0.01)
     half = max(np.ptp(sole.polygon[:, 0]) for sole in robot().soles) / 2
     surfaces, reached = stairs.surfaces(), []
@@ -121,8 +120,8 @@ def test_the_trunk_leans_ahead_over_high_stairs_only(env):
         most = 0.0
         for _ in range(round(seconds / 0.02)):
             env.step_without_info(np.zeros(len(env.action_names)))
-            most = max(most, float(env.controller.gait.treads.leaning[0]))
-        return most, float(env.controller.gait.treads.leaning[0])
+            most = max(most, float(env.controller.gait.treads.leaning))
+        return most, float(env.controller.gait.treads.leaning)
 
     config, h = TreadConfig(), robot().height_com
     most, end = leans(0.15, 3.5)

@@ -46,7 +46,7 @@ def test_the_foot_is_high_before_it_is_far_and_comes_down_when_it_is_there():
     top, lower, way = 0.09, 0.75, []
     while time_left(swing) > 0.0:
         advance_high(swing, top, lower, DT)
-        way.append((swing.time[0], *swing.reference[0, [0, 2]], *swing.reference[1:, 2]))
+        way.append((swing.time, *swing.reference[0, [0, 2]], *swing.reference[1:, 2]))
     time, x, z, speed, accel = np.array(way).T
     high = (time > 0.35 * 0.4) & (time < 0.75 * 0.4)
     assert np.all(np.abs(z[high] - top) < 2e-3)
@@ -70,17 +70,17 @@ def test_a_foot_that_higher_ground_holds_up_has_landed():
     env = walking("walk-rough", seconds=3.0)
     tick = env.controller._walk_tick
     memory, state, swing = tick.walk.memory, tick.walk.state, tick.walk.swing
-    while not memory.swinging[0] or swing.time[0] < 0.7 * swing.duration[0]:
+    while not memory.swinging or swing.time < 0.7 * swing.duration:
         env.step_without_info(np.zeros(len(env.action_names)))
-    foot = memory.foot[0]
+    foot = memory.foot
     state.sole_point[foot, 2] = swing.reference[0, 2] + 0.02
     state.sole_axes[foot] = np.eye(3)
     assert not stands_higher(tick)  # it touches nothing
     state.contacts[foot] = 1.0
     assert stands_higher(tick)
-    swing.time[0] *= 0.5
+    swing.time *= 0.5
     assert not stands_higher(tick)  # an edge on the way
-    swing.time[0] *= 2.0
+    swing.time *= 2.0
     state.sole_axes[foot, 2, 2] = np.cos(np.radians(15.0))
     assert not stands_higher(tick)  # on an edge of its sole
     state.sole_axes[foot, 2, 2] = 1.0

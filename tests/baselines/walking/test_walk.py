@@ -7,9 +7,10 @@ import pytest
 
 from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.registry import load_controller
+from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.errors import ConfigError
+from poise.configs.schema import to_dict
 from poise.envs.robots.robot import Robot
 from tests.support.shared import robot
 
@@ -126,7 +127,7 @@ def test_step_time_and_width_are_commanded():
         (2.0, GaitCommand(**still)), (4.0, GaitCommand(**still, step_time=0.45, width=0.28))
     )
     gait, state = env.controller.gait, env.simulation.state
-    assert not env.fallen and env.controller._swing.duration[0] == pytest.approx(0.45, abs=0.05)
+    assert not env.fallen and env.controller._swing.duration == pytest.approx(0.45, abs=0.05)
     across = np.array([-state.heading[1], state.heading[0]])
     feet = state.sole_points[:, :2]
     assert abs((feet[0] - feet[1]) @ across) == pytest.approx(0.28, abs=0.04)
@@ -134,7 +135,7 @@ def test_step_time_and_width_are_commanded():
     env.controller.command = GaitCommand(0.2)
     for _ in range(150):
         env.step(np.zeros(len(env.action_names)))
-    assert env.controller._swing.duration[0] == pytest.approx(gait.step_time, abs=0.05)
+    assert env.controller._swing.duration == pytest.approx(gait.step_time, abs=0.05)
 
 
 def test_a_step_time_of_a_command_is_above_zero():
@@ -180,7 +181,7 @@ def test_a_step_is_not_commanded_to_be_quicker_than_the_legs():
     _, _, env = walk((2.0, GaitCommand(0.2, step_time=0.05)))
     gait = env.controller.gait
     assert not env.fallen
-    assert env.controller._swing.duration[0] >= gait.time_min - 1e-9
+    assert env.controller._swing.duration >= gait.time_min - 1e-9
 
 
 def test_legs_that_would_land_too_late_do_not_walk():
@@ -216,3 +217,48 @@ def test_a_payload_is_borne():
             fallen += terminated
         falls.append(fallen)
     assert falls[1] <= 2 and falls[0] >= 4, falls
+
+
+def test_a_caught_walk_goes_on():
+    """Where ξ misses its place by more than `gait.catch`, the steps that catch a fall take over;
+    the walk goes on once both soles have been down for `calm_time`."""
+    data = to_dict(controller_config("walk"))
+    data["gait"]["catch"] = 0.1
+    env = ResidualStepEnv(controller=controller_config(data), duration=14.0)
+    push = {"impulse": 20.0, "direction": 90.0, "start": 4.0, "duration": 0.1}
+    env.reset(seed=0, options={"push": [push], "command": {"ahead": 0.3}})
+    gait, action, rows = env.controller.gait, np.zeros(len(env.action_names)), []
+    while env.episode.running:
+        env.step_without_info(action)
+        rows.append((env.simulation.time, env.controller.walking, bool(gait.caught)))
+    assert not env.fallen
+    time, walking, caught = np.array(rows).T
+    assert walking[(time > 1.0) & (time < 4.0)].all() and not caught[time < 4.0].any()
+    gone = time[caught == 1]
+    assert len(gone) and 4.0 < gone[0] < 5.0 and not walking[caught == 1].any()
+    assert gone[-1] - gone[0] > gait.calm_time and walking[-1] and not caught[-1]
+
+
+def test_the_miss_is_what_the_cop_leaves():
+    """ξ at touchdown, with the CoP as it is asked for, is off its regular end by `miss`."""
+    env = ResidualStepEnv(controller="walk", duration=8.0)
+    push = {"impulse": 25.0, "direction": 90.0, "start": 3.0, "duration": 0.1}
+    env.reset(seed=0, options={"push": [push], "command": {"ahead": 0.3}})
+    gait, misses = env.controller.gait, []
+    while env.episode.running and env.simulation.time < 4.0:
+        env.step_without_info(np.zeros(len(env.action_names)))
+        misses.append((env.simulation.time, float(gait.miss)))
+    time, miss = np.array(misses).T
+    before = miss[(time > 1.5) & (time < 3.0)]
+    assert miss[time > 3.0].max() > 0.1 > 3.0 * np.median(before)
+
+
+def test_walk_g1_catches_as_walk_off_g1():
+    """All gains of the steps are the same, so that it stands and catches a fall as that does."""
+    one, other = (to_dict(controller_config(name)) for name in ("walk-g1", "walk-off-g1"))
+    own = {"kind", "gait", "uncertain"}
+    assert {k: v for k, v in one.items() if k not in own} == {
+        k: v for k, v in other.items() if k not in own
+    }
+    assert one["gait"]["catch"] > 0.0 and one["gait"]["swing"] == other["swing"]
+    assert one["gait"]["qp"] == other["step_qp"]

@@ -93,9 +93,9 @@ def test_cones_of_less_friction_are_those_of_soles_that_have_it(robot, share):
     simulation = Simulation(robot)
     state = simulation.reset(*random_state(robot, np.random.default_rng(8)))
     p = controller(robot).parameters
-    simulation.state_arrays.friction[0] = share
+    simulation.state_arrays.friction = share
     narrow = sole_cones(state, p).C
-    simulation.state_arrays.friction[0] = 1.0
+    simulation.state_arrays.friction = 1.0
     contact = controller(robot).config.contact
     own = robot_cones(robot, share * contact.friction_share, contact.polygon_share)
     given = sole_cones(state, replace(p, cone=own)).C

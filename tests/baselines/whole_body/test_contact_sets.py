@@ -53,7 +53,8 @@ def test_solution_is_that_of_the_readable_problem(sets, soles):
     assert sets.failures == 0
     restricted = contact_sets.restricted(sets, state, targets, soles)
     p, rows = chosen.parameters, [filled(each, state) for each in tasks]
-    qp = build(restricted, targets, p, chosen.workspace.cop_vel, tasks=rows)
+    tasks = [*sets.tasks.values(), *rows]
+    qp = build(restricted, targets, p, tasks, chosen.workspace.cop_vel)
     solution = make_solver("active-set").solve(qp)
     assert solution.solved
     vdot, wrenches, _ = unknowns(restricted, solution.x)

@@ -31,7 +31,7 @@ def failing(robot):
 
 def break_weight(qp):
     """Every problem is invalid until the return value is called."""
-    weight = qp.parameters.com_weight
+    weight = qp.tasks["com"].block.weight
     kept = weight.copy()
     weight[:] = np.nan
     return lambda: weight.__setitem__(slice(None), kept)

@@ -8,7 +8,6 @@ import pytest
 from poise.baselines.solvers import make_solver
 from poise.baselines.whole_body.constraint_rows import (
     Bounds,
-    Rows,
     joint_limits,
     root_dynamics,
     sole_cones,
@@ -17,6 +16,9 @@ from poise.baselines.whole_body.constraint_rows import (
     torque_matrix,
 )
 from poise.baselines.whole_body.formulation import build, torques_of, unknowns
+from poise.baselines.whole_body.tasks.com import CoM
+from poise.baselines.whole_body.tasks.cop import CoP
+from poise.baselines.whole_body.tasks.task import Rows
 from tests.support.physics import recovery, robot_named
 
 
@@ -59,7 +61,7 @@ def test_the_compiled_problem_has_the_same_solution(name, root, believed):
     binding, leaning = 0, 0.0
     for tick in ticks:
         state = tick.state
-        qp = build(state, tick.targets, tick.parameters, tick.cop_vel)
+        qp = build(state, tick.targets, tick.parameters, tick.tasks, tick.cop_vel)
         solution = solve(qp)
         vdot, w, u_root = unknowns(state, solution.x)
         torques = motors(state, torques_of(state, solution.x))
@@ -77,7 +79,7 @@ def test_the_compiled_problem_has_the_same_solution(name, root, believed):
 def test_the_active_set_solver_agrees_on_the_readable_problem():
     """The full problem, with its equalities, is solved alike by two methods."""
     for tick in [tick for tick in recovery() if tick.solved][::8]:
-        qp = build(tick.state, tick.targets, tick.parameters, tick.cop_vel)
+        qp = build(tick.state, tick.targets, tick.parameters, tick.tasks, tick.cop_vel)
         ours = torques_of(tick.state, solve(qp, "active-set").x)
         np.testing.assert_allclose(motors(tick.state, ours), tick.torques, atol=1e-7)
 
@@ -85,7 +87,7 @@ def test_the_active_set_solver_agrees_on_the_readable_problem():
 def test_constraints_hold_at_the_solution(tick):
     """Dynamics, sole motion, cones, torques and joint limits hold to rounding."""
     state, p = tick.state, tick.parameters
-    x = solve(build(state, tick.targets, p, tick.cop_vel)).x
+    x = solve(build(state, tick.targets, p, tick.tasks, tick.cop_vel)).x
     for bounds in (f(state, p) for f in (root_dynamics, sole_motion, torque_limits, joint_limits)):
         value = bounds.C @ x[: bounds.C.shape[1]]
         assert np.all(value <= bounds.u + 1e-7) and np.all(value >= bounds.l - 1e-7)
@@ -97,13 +99,13 @@ def test_constraints_hold_at_the_solution(tick):
 
 
 def test_a_task_without_cost_is_disabled(tick):
-    """With ω_c = 0 the CoM's target does not matter; with its weight it does."""
+    """Without CoM and CoP tasks the CoM's target does not matter; with them it does."""
     state, p = tick.state, tick.parameters
     far = replace(tick.targets, com=tick.targets.com + [0.1, 0.0, 0.0])
-    without = replace(p, com_weight=np.zeros(3), angular_weight=np.zeros(3))
-    x, y = (solve(build(state, t, without)).x for t in (tick.targets, far))
+    without = [task for task in tick.tasks if not isinstance(task.part, CoM | CoP)]
+    x, y = (solve(build(state, t, p, without)).x for t in (tick.targets, far))
     np.testing.assert_allclose(x, y, atol=1e-9)
-    x, y = (solve(build(state, t, p)).x for t in (tick.targets, far))
+    x, y = (solve(build(state, t, p, tick.tasks)).x for t in (tick.targets, far))
     assert np.abs(x - y).max() > 0.1
 
 
@@ -112,11 +114,12 @@ def test_users_may_add_a_task_and_a_constraint(tick):
     state, p = tick.state, tick.parameters
     j = 6 + robot_named("humanoid").joint_names.index("left_elbow")
     pick = np.eye(1, len(state.qvel), j)
-    plain = build(state, tick.targets, p)
+    plain = build(state, tick.targets, p, tick.tasks)
     wave = Rows(pick, np.array([7.0]), np.array([1e4]))
-    assert solve(build(state, tick.targets, p, tasks=[wave])).x[j] == pytest.approx(7.0, abs=0.01)
+    waving = build(state, tick.targets, p, [*tick.tasks, wave])
+    assert solve(waving).x[j] == pytest.approx(7.0, abs=0.01)
     bound = Bounds(pick, np.array([3.0]), np.array([4.0]))
-    bounded = build(state, tick.targets, p, constraints=[bound])
+    bounded = build(state, tick.targets, p, tick.tasks, constraints=[bound])
     assert 3.0 - 1e-9 <= solve(bounded).x[j] <= 4.0 + 1e-9
     assert not 3.0 <= solve(plain).x[j] <= 4.0
     assert len(bounded.l) == len(plain.l) + 1
@@ -126,7 +129,9 @@ def test_building_is_pure(tick):
     """Two builds give the same numbers, and neither the state nor the targets change."""
     state, targets = tick.state, tick.targets
     before = [array.copy() for array in (*state.arrays.members(), *targets.arrays().members())]
-    first, second = (build(state, targets, tick.parameters, tick.cop_vel) for _ in range(2))
+    first, second = (
+        build(state, targets, tick.parameters, tick.tasks, tick.cop_vel) for _ in range(2)
+    )
     for name in "HgClu":
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
     for a, b in zip(before, (*state.arrays.members(), *targets.arrays().members()), strict=True):

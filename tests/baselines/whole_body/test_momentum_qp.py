@@ -198,7 +198,7 @@ def test_a_robot_on_one_sole(robot):
     assert qp.failures == 0
     assert qp.wrenches.shape == (6,)
     np.testing.assert_allclose(qp.wrenches[:3], (state.A @ qp.vdot + state.A_bias)[:3], atol=1e-7)
-    x = make_solver("daqp").solve(build(state, targets, qp.parameters)).x
+    x = make_solver("daqp").solve(build(state, targets, qp.parameters, qp.tasks.values())).x
     theirs = torques_of(state, x)[state.robot.motor_dofs - 6]
     np.testing.assert_allclose(torques, theirs, atol=1e-7)
 
@@ -211,10 +211,8 @@ def test_weights_behave(robot):
 
     def missed(com, posture):
         qp = controller(robot)
-        p = qp.parameters
-        qp.parameters = replace(
-            p, com_weight=com * p.com_weight, accel_weight=posture * p.accel_weight
-        )
+        qp.tasks["com"].block.weight[:] *= com
+        qp.tasks["posture"].block.weight[:] *= posture
         qp.torques(state, targets)
         rate = (state.A @ qp.vdot + state.Adot_v)[0] / state.mass
         return abs(rate - 1.0), np.abs(qp.vdot[6:]).max()
@@ -281,7 +279,7 @@ def test_other_robots_stand_as_described(name):
     """`com.offset` was searched on the default humanoid; others do not lean for it."""
     env = ResidualBalanceEnv(name, duration=4.0, pushes=None)
     env.reset(seed=3)
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(np.zeros(4))
     state, standing = env.simulation.state, env.simulation.arrays.root_standing
     assert np.degrees(np.arccos(state.root_axes[2] @ standing[2])) < 0.3

@@ -1,14 +1,12 @@
 """The eliminated problem: every x obeys physics, and the solution obeys every limit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from poise.baselines.controller import Targets
 from poise.baselines.solvers import make_solver, residuals
-from poise.baselines.whole_body.constraint_rows import posture_rows
 from poise.baselines.whole_body.constraints import braking_bounds
+from poise.baselines.whole_body.tasks.task import task_input
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import controller, random_state, recovery, robot_named
 
@@ -115,8 +113,7 @@ def test_at_rest_the_ground_carries_the_weight(robot):
 def test_an_acceleration_that_nothing_hinders_is_reproduced(robot):
     """Targets that all ask for one feasible motion get it: v̇ is the desired one."""
     qp = controller(robot)
-    p = qp.parameters
-    qp.parameters = replace(p, angular_weight=np.zeros(3))
+    qp.tasks["cop"].block.weight[:] = 0.0
     state = Simulation(robot).state
     targets = Targets.standing(robot, state)
     qp.problem(state, targets)  # for N
@@ -143,7 +140,7 @@ def test_posture_error_is_a_rotation_at_any_angle():
     for _ in range(20):
         state = simulation.reset(*random_state(robot, rng))
         qp.problem(state, targets)
-        rows = posture_rows(state, targets, qp.parameters)
+        rows = qp.tasks["posture"].rows(task_input(state, targets))
         weighed = rows.weights > 0.0
         np.testing.assert_allclose(
             qp.workspace.accel_des[weighed], rows.b[weighed], rtol=1e-7, atol=1e-7

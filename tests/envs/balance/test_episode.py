@@ -4,11 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.envs.balance import episode
 from poise.envs.balance.episode import (
-    METRICS,
     EpisodeArrays,
     Judge,
+    Metrics,
     begin_episode,
     judge_step,
     record_tick,
@@ -23,7 +22,7 @@ from tests.support.shared import generic_state, robot
 def new_episode(actions, nc=2):
     """An empty record."""
     sizes = {"na": actions, "no": 1, "terms": len(REWARD_TERMS), "nc": nc}
-    return EpisodeArrays.allocate(sizes | {"nu": robot().model.nu})
+    return EpisodeArrays.allocate(sizes | {"nu": robot().model.nu}, metrics=Metrics.allocate())
 
 
 def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, actions=3, e=None,
@@ -35,7 +34,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         begin_episode(simulation.state_arrays, e)
         e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
     simulation.views.ctrl[:] = 0.0 if tau is None else tau
-    simulation.clock[0] = round(time / simulation.arrays.timestep)
+    simulation.clock.steps = round(time / simulation.arrays.timestep)
     bounds = episode_limits(limits or FallLimits(), r.height_com, 100, 50)
     view = RewardView(
         robot=simulation.arrays,
@@ -60,7 +59,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
             episode=e,
         )
     )
-    return float(e.reward[0]), e
+    return float(e.reward), e
 
 
 def test_each_reward_term_is_its_formula():
@@ -160,10 +159,10 @@ def test_pace_tells_from_afar_how_far_a_walk_is_from_its_command():
 def test_a_fall_costs_its_weight_and_earns_nothing():
     """In the step of the fall the positive terms are zero."""
     simulation = generic_state()
-    simulation.state_arrays.other_contacts[0] = 1.0
+    simulation.state_arrays.other_contacts = 1.0
     reward, e = play(simulation)
     terms = dict(zip(REWARD_TERMS, e.reward_terms, strict=True))
-    assert e.metrics[episode.FALLEN] == 1.0 and terms["fall"] == -RewardWeights().fall
+    assert e.metrics.fallen == 1.0 and terms["fall"] == -RewardWeights().fall
     assert all(terms[name] == 0.0 for name in ("alive", "com", "capture", "quiet", "posture"))
     assert terms["action"] < 0.0
     assert reward == pytest.approx(sum(terms.values()))
@@ -209,7 +208,7 @@ def test_what_a_fall_is():
     s.com[2] = 0.59 * robot().height_com
     assert fallen(simulation)
     simulation.reset()
-    s.other_contacts[0] = 1.0
+    s.other_contacts = 1.0
     assert fallen(simulation) and not fallen(simulation, ground_contact=False)
     simulation.reset()
     s.com_vel[2] = np.nan
@@ -225,7 +224,7 @@ def tilted(degrees, axis):
     other = [-q[1], q[0], -q[3], q[2]] if axis == 0 else [-q[2], q[3], q[0], -q[1]]
     qpos[3:7] = c * q + s * np.array(other)
     simulation.reset(qpos)
-    simulation.state_arrays.other_contacts[0] = 0.0
+    simulation.state_arrays.other_contacts = 0.0
     return simulation
 
 
@@ -246,8 +245,8 @@ def test_only_who_stands_upright_is_quiet(axis):
     s.contacts[:] = 1.0  # tilted, one foot is in the air
     for limit, steps in ((21.0, 1.0), (19.0, 0.0)):
         _, e = play(simulation, time=0.02, limits=FallLimits(quiet_tilt=limit))
-        assert e.metrics[episode.FALLEN] == 0.0
-        assert e.metrics[episode.QUIET_STEPS] == steps
+        assert e.metrics.fallen == 0.0
+        assert e.metrics.quiet_steps == steps
 
 
 def test_quiet_steps_count_and_start_again():
@@ -256,14 +255,14 @@ def test_quiet_steps_count_and_start_again():
     s = simulation.state_arrays
     _, e = play(simulation, time=0.02)
     play(simulation, time=0.04, e=e)
-    assert e.metrics[episode.QUIET_STEPS] == 2.0 and e.metrics[episode.LAST_MOVING] == 0.0
+    assert e.metrics.quiet_steps == 2.0 and e.metrics.last_moving == 0.0
     s.com_vel[0] = 0.11
     play(simulation, time=0.06, e=e)
-    assert e.metrics[episode.QUIET_STEPS] == 0.0 and e.metrics[episode.LAST_MOVING] == 0.06
+    assert e.metrics.quiet_steps == 0.0 and e.metrics.last_moving == 0.06
     simulation.reset()
     s.com[0] += 0.5  # at rest, but not over the soles
     play(simulation, time=0.08, e=e)
-    assert e.metrics[episode.QUIET_STEPS] == 0.0 and e.metrics[episode.LAST_MOVING] == 0.08
+    assert e.metrics.quiet_steps == 0.0 and e.metrics.last_moving == 0.08
 
 
 def test_a_robot_that_skates_is_not_quiet():
@@ -275,8 +274,8 @@ def test_a_robot_that_skates_is_not_quiet():
     for _ in range(4):
         s.sole_point[1, 1] += 0.006
         play(simulation, e=e)
-        counts.append(e.metrics[episode.QUIET_STEPS])
-    assert counts == [2.0, 0.0, 1.0, 0.0] and e.metrics[episode.LAST_MOVING] == 0.0
+        counts.append(e.metrics.quiet_steps)
+    assert counts == [2.0, 0.0, 1.0, 0.0] and e.metrics.last_moving == 0.0
 
 
 def test_a_sole_may_creep():
@@ -286,16 +285,16 @@ def test_a_sole_may_creep():
     for steps in range(2, 150):
         simulation.state_arrays.sole_point[0, 0] += 0.00015
         play(simulation, e=e)
-        assert e.metrics[episode.QUIET_STEPS] == steps
+        assert e.metrics.quiet_steps == steps
 
 
 def test_largest_excursions_are_kept():
     """Maxima of CoM, capture point and slide, and the smallest CoP margin, do not come back."""
     simulation = Simulation(robot())
-    s, m = simulation.state_arrays, episode
+    s = simulation.state_arrays
     _, e = play(simulation)
     margin = simulation.state.support_distance(simulation.state.cop)
-    assert e.metrics[m.MIN_COP_MARGIN] == pytest.approx(margin)
+    assert e.metrics.min_cop_margin == pytest.approx(margin)
     s.com[:2] = s.origin[:2] + [0.03, 0.04]
     s.capture_point[:] = s.origin[:2] + [-0.06, 0.08]
     s.cop[:] = s.origin[:2] + [5.0, 0.0]
@@ -303,10 +302,10 @@ def test_largest_excursions_are_kept():
     play(simulation, e=e)
     simulation.reset()
     play(simulation, e=e)
-    assert e.metrics[m.MAX_COM] == pytest.approx(0.05)
-    assert e.metrics[m.MAX_CAPTURE] == pytest.approx(0.1)
-    assert e.metrics[m.MAX_SLIDE] == pytest.approx(0.02)
-    assert e.metrics[m.MIN_COP_MARGIN] < -4.0
+    assert e.metrics.max_com == pytest.approx(0.05)
+    assert e.metrics.max_capture == pytest.approx(0.1)
+    assert e.metrics.max_slide == pytest.approx(0.02)
+    assert e.metrics.min_cop_margin < -4.0
 
 
 def test_ticks_account_for_power_and_saturation():
@@ -318,12 +317,12 @@ def test_ticks_account_for_power_and_saturation():
     tau[:3] = -r.torque_limit[:3]
     record_tick(simulation.arrays, simulation.state_arrays.qvel, tau, 0.004, e)
     power = tau * simulation.state.qvel[r.motor_dofs]
-    assert e.metrics[episode.ENERGY] == pytest.approx(0.004 * np.abs(power).sum())
-    assert e.metrics[episode.POSITIVE_WORK] == pytest.approx(0.004 * power[power > 0.0].sum())
-    assert e.metrics[episode.SATURATED] == pytest.approx(3 / r.model.nu)
-    assert e.metrics[episode.PEAK_TORQUE] == pytest.approx(1.0)
-    assert e.metrics[episode.TICKS] == 1.0
-    assert e.metrics[episode.TORQUE_VARIATION] == 0.0  # there was no torque before it
+    assert e.metrics.energy == pytest.approx(0.004 * np.abs(power).sum())
+    assert e.metrics.positive_work == pytest.approx(0.004 * power[power > 0.0].sum())
+    assert e.metrics.saturated == pytest.approx(3 / r.model.nu)
+    assert e.metrics.peak_torque == pytest.approx(1.0)
+    assert e.metrics.ticks == 1.0
+    assert e.metrics.torque_variation == 0.0  # there was no torque before it
 
 
 def test_torque_variation_is_the_way_that_torques_go_over_their_limits():
@@ -335,8 +334,8 @@ def test_torque_variation_is_the_way_that_torques_go_over_their_limits():
         for fraction in fractions:
             tau = fraction * r.torque_limit
             record_tick(simulation.arrays, simulation.state_arrays.qvel, tau, 0.004, e)
-        assert e.metrics[episode.TORQUE_TIME] == pytest.approx(0.004 * len(fractions))
-        return e.metrics[episode.TORQUE_VARIATION]
+        assert e.metrics.torque_time == pytest.approx(0.004 * len(fractions))
+        return e.metrics.torque_variation
 
     assert variation([-0.5, 0.5]) == pytest.approx(1.0)
     assert variation(np.linspace(-0.5, 0.5, 9)) == pytest.approx(1.0)
@@ -347,9 +346,11 @@ def test_a_new_episode_forgets_the_last():
     """Everything recorded is cleared, and the feet are where they should stay."""
     simulation = generic_state()
     e = new_episode(2)
-    e.action[:], e.last_action[:], e.reward_terms[:], e.metrics[:] = 1.0, 1.0, 1.0, 1.0
+    e.action[:], e.last_action[:], e.reward_terms[:] = 1.0, 1.0, 1.0
+    for name in e.metrics.mutable:
+        setattr(e.metrics, name, 1.0)
     begin_episode(simulation.state_arrays, e)
     assert not e.action.any() and not e.last_action.any() and not e.reward_terms.any()
-    assert e.metrics[episode.MIN_COP_MARGIN] == np.inf
-    assert np.count_nonzero(e.metrics) == 1 and len(e.metrics) == METRICS
+    assert e.metrics.min_cop_margin == np.inf
+    assert np.count_nonzero(list(e.metrics.mutable_values().values())) == 1
     np.testing.assert_array_equal(e.sole_start, simulation.state.sole_points[:, :2])

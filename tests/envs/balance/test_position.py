@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.balance.episode import ENERGY, PEAK_TORQUE, TICKS
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
@@ -42,8 +41,8 @@ def test_it_is_a_simulation_with_pd_in_every_physics_step(env):
         np.testing.assert_allclose(simulation.data.qvel, data.qvel, atol=1e-5)
         np.testing.assert_allclose(data.ctrl, tau, atol=1e-3)
     metrics = env.episode.metrics
-    assert metrics[TICKS] == 80 and metrics[PEAK_TORQUE] == 1.0
-    assert metrics[ENERGY] == pytest.approx(energy, rel=1e-5)
+    assert metrics.ticks == 80 and metrics.peak_torque == 1.0
+    assert metrics.energy == pytest.approx(energy, rel=1e-5)
 
 
 @pytest.mark.parametrize("name", ["humanoid", "compact", "tall", "toddler"])
@@ -54,7 +53,7 @@ def test_action_zero_stands(name, timestep):
     env = PositionBalanceEnv(coarser_robot(robot(name), timestep), **long)
     env.reset(seed=1)
     action = np.zeros(env.action_space.shape)
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(action)
     assert env.recovered and not env.fallen
     assert abs(env.simulation.state.qvel).max() < 0.01

@@ -359,6 +359,6 @@ def test_a_copy_keeps_the_room_around_its_arrays():
         env = env_of(kind)
         for make in WAYS.values():
             twin = make(env)
-            for name in ("observation", "reward", "metrics"):
-                before, after = (getattr(each.episode, name) for each in (env, twin))
+            for name in ("observation", "reward", "reward_terms"):
+                before, after = (each.episode.named()[name] for each in (env, twin))
                 assert after.base is not None and after.base.size == before.base.size

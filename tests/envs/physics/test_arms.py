@@ -60,7 +60,7 @@ def test_what_a_controller_asks_of_arms_is_replaced(source):
     legs = np.setdiff1d(np.arange(len(dofs)), arms)
     np.testing.assert_allclose(acting[legs], asked[legs], rtol=1e-12)
     a, q, dq = source.arms, data.qpos[dofs[arms] + 1], data.qvel[dofs[arms]]
-    u = (a.step[0] - 1) % a.period / a.period
+    u = (a.step - 1) % a.period / a.period
     target = a.last + (a.goal - a.last) * (10 * u**3 - 15 * u**4 + 6 * u**5)
     servo = a.inertia * (RATE**2 * (target - q) - 2.0 * RATE * dq)
     limit = robot().torque_limit[arms]

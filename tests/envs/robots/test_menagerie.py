@@ -158,6 +158,6 @@ def test_it_is_as_its_maker_says_and_stands(name: str) -> None:
     margins = [env.simulation.state.support_margin(angle) for angle in (0.0, 90.0, 180.0, 270.0)]
     assert min(margins) > 0.05 * robot.height_com
     env.reset(seed=0)
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(np.zeros(4))
     assert not env.fallen

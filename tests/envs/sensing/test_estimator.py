@@ -78,6 +78,12 @@ def test_sources_of_one_robot_share_its_model():
     assert one.simulation.model is not other.simulation.model  # each draws a robot of its own
 
 
+def delays(source: EstimatedState) -> tuple[int, int, int, bool]:
+    """Physics steps that are late, were asked for before, and are predicted; whether exact."""
+    b = source.estimation
+    return b.sense, b.earlier, b.horizon, b.exact
+
+
 def test_auto_is_exact_where_no_sensor_errs():
     """And the time that is led on is what the estimator takes for the delay."""
     level = {
@@ -85,14 +91,12 @@ def test_auto_is_exact_where_no_sensor_errs():
         "motors": {"lag": 0.006},
     }
     source = estimated(level)
-    assert source.estimation.steps[:4].tolist() == [5, 7, 12, 1]
+    assert delays(source) == (5, 7, 12, True)
     under = {"latency": {"sense": 0.01, "misjudged": -0.004}}
-    assert estimated(under).estimation.steps[:4].tolist() == [5, 0, 3, 1]
-    assert (
-        estimated("lab").estimation.steps[3] == 0
-        and estimated("lab", kind="exact").estimation.steps[3]
-    )
-    assert estimated(level, predictor="none").estimation.steps[:4].tolist() == [5, 7, 0, 1]
+    assert delays(estimated(under)) == (5, 0, 3, True)
+    assert not estimated("lab").estimation.exact
+    assert estimated("lab", kind="exact").estimation.exact
+    assert delays(estimated(level, predictor="none")) == (5, 7, 0, True)
 
 
 @pytest.mark.parametrize(
@@ -125,4 +129,4 @@ def test_the_drawn_robot_is_what_the_source_begins_with(source):
     source.plant.become(drawn)
     source.simulation.reset()
     source.begin(drawn, np.zeros(robot().model.nu))
-    assert source.drawn is drawn and source.estimation.steps[0] == drawn.sense
+    assert source.drawn is drawn and source.estimation.sense == drawn.sense

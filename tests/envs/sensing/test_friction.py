@@ -20,7 +20,7 @@ def after_a_push(level, push=PUSH, seed=3, **estimator):
         estimator=EstimatorConfig(**estimator),
     )  # fmt: skip
     env.reset(seed=seed, options={"push": push})
-    while env.episode.running[0]:
+    while env.episode.running:
         env.advance()
     return env
 

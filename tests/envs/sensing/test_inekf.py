@@ -9,13 +9,6 @@ from scipy.spatial.transform import Rotation
 from poise.envs.compiled.maths.vectors import skew
 from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.inekf import (
-    ATTITUDE,
-    ENCODER,
-    FORCE,
-    FORCE_WALK,
-    GYRO,
-    GYRO_WALK,
-    KINEMATICS,
     Invariant,
     correct_error,
     find_sole,
@@ -40,7 +33,9 @@ def source() -> EstimatedState:
 def filter_(source: EstimatedState) -> Invariant:
     """A filter without noise in a generic state, with a generic covariance."""
     f, rng = source.invariant, np.random.default_rng(6)
-    f.numbers[:] = 0.0
+    for name in ("gyro", "force", "gyro_walk", "force_walk", "attitude", "encoder", "kinematics"):
+        setattr(f, name, 0.0)
+    f.slide = f.roll = f.lift = 0.0
     root = rng.normal(size=(N, N))
     f.P[:] = root @ root.T / N
     chi = np.eye(7)
@@ -115,7 +110,7 @@ def test_the_covariance_is_led_on_by_the_errors_own_dynamics(filter_):
         return np.r_[error(led, after[0]), kept - after[1]]
 
     F, P = differences(f, step), f.P.copy()
-    f.numbers[[GYRO, FORCE, GYRO_WALK, FORCE_WALK]] = 0.3, 0.7, 0.1, 0.2
+    f.gyro, f.force, f.gyro_walk, f.force_walk = 0.3, 0.7, 0.1, 0.2
     lead_on(f, *IMU)
     Q = np.diag(np.r_[np.zeros(15), 3 * [DT * 0.1**2], 3 * [DT * 0.2**2]])
     for columns, deviation in ((slice(15, 18), 0.3), (slice(18, 21), 0.7)):
@@ -159,7 +154,7 @@ def test_errors_are_led_on_linearly_however_large_they_are(filter_):
 def test_an_attitude_is_of_the_rotations_error(filter_):
     f = filter_
     attitude, P = f.odometry.axes.copy(), f.P.copy()
-    f.numbers[ATTITUDE] = 0.1
+    f.attitude = 0.1
 
     def step() -> np.ndarray:
         see_attitude(f, attitude)
@@ -194,8 +189,8 @@ def test_a_sole_is_of_the_difference_of_positions(filter_, i):
     f = filter_
     f.odometry.rings.q[0] = f.odometry.state.qpos[7:] + 0.1
     find_sole(f, i, f.odometry.rings.q[0])
-    f.place[2 + i] = f.place[1] + f.odometry.axes @ f.seen
-    f.numbers[[ENCODER, KINEMATICS]] = 0.001, 0.0005
+    f.soles[i] = f.position + f.odometry.axes @ f.seen
+    f.encoder, f.kinematics = 0.001, 0.0005
     P = f.P.copy()
 
     def step() -> np.ndarray:

@@ -27,7 +27,7 @@ def flight(source: EstimatedState, level: dict) -> list[dict[str, np.ndarray]]:
     rings, data, seen = source.sensors.rings, source.simulation.data, []
     for _ in range(6):
         source.simulation.step(0.3 * robot().torque_limit * rng.uniform(-1, 1, robot().model.nu))
-        row = rings.next[0] - 1
+        row = rings.next - 1
         pose = {"p": data.qpos[:3].copy(), "R": Rotation.from_quat(data.qpos[[4, 5, 6, 3]])}
         seen.append(
             pose | {n: getattr(rings, n)[row].copy() for n in ("gyro", "force", "attitude")}
@@ -146,7 +146,7 @@ def test_what_was_before_an_episode_is_its_start(source):
     """All rows are full, one measurement is counted; another seed of noise reads otherwise."""
     start(source, {"sensors": {"encoder_noise": 0.001}}, 1)
     rings = source.sensors.rings
-    assert rings.count[0] == 1 and rings.next[0] == 0 and len(rings.q) == RING
+    assert rings.count == 1 and rings.next == 0 and len(rings.q) == RING
     assert np.array_equal(rings.truth_qpos, np.tile(source.simulation.data.qpos, (RING, 1)))
     first = rings.q.copy()
     start(source, {"sensors": {"encoder_noise": 0.001}}, 1)

@@ -35,7 +35,7 @@ def test_torques_are_late_by_whole_steps(source):
     np.testing.assert_allclose(acted[3:], torques[:-3], rtol=1e-12)
     assert not np.any(acted[:3])
     start(source, {"latency": {"command": 0.005}})
-    assert source.motors.late[0] == 2
+    assert source.motors.late == 2
 
 
 def test_a_lag_is_of_first_order(source):

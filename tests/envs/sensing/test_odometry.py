@@ -26,10 +26,10 @@ def env(request: pytest.FixtureRequest) -> ResidualBalanceEnv:
 def velocity_errors(env: ResidualBalanceEnv, first: float, last: float) -> list[np.ndarray]:
     """The root's believed velocity over the true one, both of when it was measured [m/s]."""
     source, errors = env.state_source, []
-    while env.simulation.time < last - 1e-9 and env.episode.running[0]:
+    while env.simulation.time < last - 1e-9 and env.episode.running:
         env.step_without_info(np.zeros(env.action_space.shape))
         rings = source.sensors.rings
-        row = rings.next[0] - 1 - source.estimation.steps[0]
+        row = rings.next - 1 - source.estimation.sense
         if env.simulation.time > first + 1e-9:
             errors.append(source.odometry.v[:3] - rings.truth_qvel[row, :3])
     return errors
@@ -118,8 +118,8 @@ def test_raw_readings_are_not_filtered():
     for _ in range(10):
         source.simulation.step(np.zeros(robot().model.nu))
         source.update()
-    rings, late = source.sensors.rings, source.estimation.steps[0]
-    row = rings.next[0] - 1 - late
+    rings, late = source.sensors.rings, source.estimation.sense
+    row = rings.next - 1 - late
     assert late > 0
     np.testing.assert_allclose(source.odometry.q, rings.q[row], atol=1e-12)
     np.testing.assert_allclose(source.odometry.v[6:], rings.dq[row], atol=1e-12)

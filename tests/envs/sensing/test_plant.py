@@ -13,6 +13,7 @@ from poise.envs.robots.robot import on_terrain
 from poise.envs.sensing.drawn import CHANGED, Plant
 from poise.envs.terrain.arrays import ground_height
 from poise.envs.terrain.bumps import Bumps
+from poise.envs.terrain.terrain import Surface
 from tests.support.physics import random_state
 from tests.support.sensing import drawn_of
 from tests.support.shared import robot
@@ -113,7 +114,8 @@ def heights(plant: Plant) -> np.ndarray:
     mujoco.mj_kinematics(simulation.model, simulation.data)
     found = []
     for x, y in (
-        (0.5 * (s[0] + s[1]), 0.5 * (s[2] + s[3])) for s in simulation.arrays.surfaces[1:]
+        (0.5 * (s["x_min"] + s["x_max"]), 0.5 * (s["y_min"] + s["y_max"]))
+        for s in simulation.arrays.surfaces[1:]
     ):
         origin = np.array([x, y, 0.2])
         way = mujoco.mj_ray(simulation.model, simulation.data, origin, down, None, 1, -1, hit)
@@ -128,34 +130,38 @@ def test_bumps_are_as_high_as_drawn_and_half_of_them_are_there(bumpy):
         bumpy.become(drawn)
         bumpy.simulation.reset()
         found, surfaces = heights(bumpy), bumpy.simulation.arrays.surfaces
-        middles = 0.5 * (surfaces[1:, [0, 2]] + surfaces[1:, [1, 3]])
+        x_min, x_max, y_min, y_max, height = (surfaces[name][1:] for name in Surface._fields[:5])
+        middles = 0.5 * np.stack([x_min + x_max, y_min + y_max], axis=1)
         believed = [ground_height(surfaces, 0.0, x, y) for x, y in middles]
         np.testing.assert_allclose(found, believed, atol=1e-9)
         assert 0.9 * drawn.bumps < found.max() <= drawn.bumps
-        assert 0.3 < np.mean(surfaces[1:, 4] > 0.0) < 0.7
+        assert 0.3 < np.mean(height > 0.0) < 0.7
         model = bumpy.simulation.model  # those that are not there share no plane with the floor
         tops = np.array([model.geom(f"terrain_{i}").pos[2] + model.geom(f"terrain_{i}").size[2]
                          for i in range(1, len(surfaces))])  # fmt: skip
-        np.testing.assert_allclose(tops, np.where(surfaces[1:, 4] > 0, surfaces[1:, 4], -0.05))
-        assert np.all(np.abs(surfaces[1:, :4]).reshape(-1, 2, 2).max(axis=2).max(axis=1) > 0.1)
+        np.testing.assert_allclose(tops, np.where(height > 0, height, -0.05))
+        edges = np.abs([x_min, x_max, y_min, y_max])
+        assert np.all(edges.max(axis=0) > 0.1)
         assert np.all(np.hypot(*middles.T) > 0.3)
-    before = surfaces[1:, 4].copy()
+    before = surfaces["height"][1:].copy()
     bumpy.become(drawn_of({"ground": {"bumps": [0.01, 0.03]}}, 1))
-    assert not np.array_equal(surfaces[1:, 4], before)
+    assert not np.array_equal(surfaces["height"][1:], before)
 
 
 def test_a_foot_stands_on_a_bump(bumpy):
     """Its sole is held up by the bump's height, wherever it was let down from."""
     bumpy.become(drawn_of({"ground": {"bumps": 0.02}}, 5))
     simulation = bumpy.simulation
-    highest = simulation.arrays.surfaces[1 + np.argmax(simulation.arrays.surfaces[1:, 4])]
+    surfaces = simulation.arrays.surfaces
+    highest = Surface(*surfaces[np.argmax(surfaces["height"])].tolist())
     qpos = robot().standing_qpos.copy()
     foot = simulation.reset(qpos).arrays.sole_point[0]
-    qpos[:2] += 0.5 * (highest[[0, 2]] + highest[[1, 3]]) - foot[:2]
-    qpos[2] += highest[4]
+    middle = [highest.x_min + highest.x_max, highest.y_min + highest.y_max]
+    qpos[:2] += 0.5 * np.array(middle) - foot[:2]
+    qpos[2] += highest.height
     state = simulation.reset(qpos)
     assert state.contacts[0] == 1.0
-    assert state.ground[0] == pytest.approx(highest[4])
+    assert state.ground[0] == pytest.approx(highest.height)
 
 
 def test_bumps_need_level_ground():

@@ -1,4 +1,4 @@
-"""envs/sensing/push_force.py: the force that pushes, from the CoM and the CoP alone."""
+"""envs/sensing/push_force.py: the force that pushes, from momentum and CoP alone."""
 
 import mujoco
 import numpy as np
@@ -15,7 +15,7 @@ ROBOT = robot_named("humanoid")
 SUBSTEPS = round(PERIOD / ROBOT.model.opt.timestep)
 
 
-def observed(push, seconds, smoothing=0.7, memory=20.0):
+def observed(push, seconds, smoothing=0.2, memory=20.0):
     """(F̂ (ticks, 2), F̄ (ticks, 2)) while `momentum-qp` stands under a push."""
     simulation, qp = Simulation(ROBOT), controller(ROBOT)
     simulation.reset(pushes=[push])
@@ -32,21 +32,37 @@ def observed(push, seconds, smoothing=0.7, memory=20.0):
     return np.array(forces), np.array(means)
 
 
+def lever():
+    """z/h of the point of the torso that is pushed, while the robot stands."""
+    standing = mujoco.MjData(ROBOT.model)
+    standing.qpos[:] = ROBOT.standing_qpos
+    mujoco.mj_kinematics(ROBOT.model, standing)
+    return standing.body("torso").xipos[2] / ROBOT.height_com
+
+
 @pytest.mark.parametrize("direction", [0.0, 120.0, 270.0])
 def test_a_force_that_lasts_is_found_with_its_moment_about_the_ground(direction):
     """At rest under 15 N on the torso F̂ is F z/h, z the height of the point that is pushed."""
     force, seconds = 15.0, 6.0
     push = Push("torso", 0.5, 10.0, 10.0 * force, direction)
     found, _ = observed(push, seconds)
-    standing = mujoco.MjData(ROBOT.model)
-    standing.qpos[:] = ROBOT.standing_qpos
-    mujoco.mj_kinematics(ROBOT.model, standing)
-    z = standing.body("torso").xipos[2]
     angle = np.radians(direction)
-    expected = force * z / ROBOT.height_com * np.array([np.cos(angle), np.sin(angle)])
+    expected = force * lever() * np.array([np.cos(angle), np.sin(angle)])
     np.testing.assert_allclose(found[-250:].mean(axis=0), expected, atol=0.04 * force)
     before = found[round(0.35 / PERIOD) : round(0.48 / PERIOD)]  # when the start has settled
     assert np.abs(before).max() < 0.1 * force
+
+
+@pytest.mark.parametrize("direction", [0.0, 90.0, 180.0])
+def test_a_force_is_found_while_trunk_and_arms_turn(direction):
+    """A tenth of a second after 60 N began F̂ is F z/h, though L̇/h is as large as F by then."""
+    force = 60.0
+    found, _ = observed(Push("torso", 0.5, 0.3, 0.3 * force, direction), 0.8, smoothing=0.07)
+    angle = np.radians(direction)
+    way = np.array([np.cos(angle), np.sin(angle)])
+    during = found[round(0.6 / PERIOD) : round(0.78 / PERIOD)]
+    np.testing.assert_allclose(during @ way, force * lever(), rtol=0.06)
+    np.testing.assert_allclose(during @ [-way[1], way[0]], 0.0, atol=0.05 * force)
 
 
 def test_the_mean_keeps_the_impulse_of_a_short_push():
@@ -75,8 +91,7 @@ def test_without_support_nothing_is_learned():
 def test_an_episode_begins_with_nothing():
     """`forget_pushes` makes the estimate what it is at first."""
     estimate = push_force(ROBOT.omega)
-    for array in (estimate.force, estimate.mean, estimate.size, estimate.begun):
-        array[:] = 3
+    estimate.force[:], estimate.mean[:], estimate.size, estimate.begun = 3.0, 3.0, 3.0, 1
     forget_pushes(estimate)
     fresh = push_force(ROBOT.omega)
     for name in ("force", "mean", "size", "begun"):

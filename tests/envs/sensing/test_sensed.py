@@ -221,7 +221,7 @@ def test_the_fall_is_judged_by_the_truth(limp):
     falls = []
     for level in (PLAIN, {"latency": {"sense": 0.05}}):
         under(limp, level).reset(seed=0, options={"noise": 0.0, "push": []})
-        while limp.episode.running[0]:
+        while limp.episode.running:
             limp.step_without_info(np.zeros(limp.action_space.shape))
         falls.append(limp.steps)
     assert limp.fallen and falls[0] == falls[1]

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from poise.baselines.controller import Targets
-from poise.envs.balance.episode import EDGE_CONTACTS
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain
@@ -172,4 +171,4 @@ def test_edges_are_counted_once_each_time_a_foot_comes_to_one():
         env.reset(seed=0, options={"qpos": qpos, "qvel": np.zeros(env.model.nv)})
         for _ in range(3):
             env.step(np.zeros(env.action_space.shape))
-        assert env.episode.metrics[EDGE_CONTACTS] == count
+        assert env.episode.metrics.edge_contacts == count

@@ -63,7 +63,7 @@ def trajectory(robot, render):
         *base.simulation.state_arrays.members(),
         data.qacc,
     ]
-    arrays += [data.qacc_warmstart, data.light_xpos, base.simulation.clock]
+    arrays += [data.qacc_warmstart, data.light_xpos, base.simulation.clock.memory_of("steps")]
     for _ in range(10):
         observation = env.step(np.full(4, 0.3))[0]
         if render:
@@ -175,10 +175,10 @@ def test_camera_follows_with_a_delay_and_starts_afresh(can_render, simulation, r
     moved[0] += 1.0
     simulation.data.qpos[:] = moved
     simulation.step(np.zeros(simulation.model.nu))
-    simulation.clock[0] = 50
+    simulation.clock.steps = 50
     renderer.render()
     assert 0.05 < renderer.view.lookat[0] < 0.5
-    simulation.clock[0] = 50_000
+    simulation.clock.steps = 50_000
     renderer.render()
     assert renderer.view.lookat[0] == pytest.approx(simulation.state.com[0], abs=1e-6)
     simulation.reset(robot.standing_qpos)

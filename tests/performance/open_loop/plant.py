@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.in_place.pd import PDGains, joint_gains
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
-from poise.baselines.whole_body.parameters import joint_kinds
+from poise.baselines.whole_body.tasks.posture import joint_kinds
 from poise.configs.numbers import whole_steps
 from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.arrays import robot_arrays

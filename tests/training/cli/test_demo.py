@@ -35,7 +35,7 @@ def run(out: Path, full: bool = False) -> list[str]:
     """Lines that the demo prints."""
     text = io.StringIO()
     console = Console(file=text, width=140)
-    demo.demo(out, full=full, controllers=BOTH, console=console)
+    demo.run_demo(out, full=full, controllers=BOTH, console=console)
     return text.getvalue().rstrip().splitlines()
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from poise.configs.errors import ConfigError
 from poise.envs.sensing.realism import load_realism
 from poise.training.cli.entry import main
-from poise.training.cli.train import gained, last_words, parse, steps_note
+from poise.training.cli.train import gained, last_words, parse_train, steps_note
 from poise.training.learning.callbacks import Progress
+from tests.support.refused import refused
 from tests.support.shared import finished_run, tiny_config
 
 
@@ -57,10 +57,10 @@ def test_a_run_ends_with_what_it_measured_and_what_comes_next() -> None:
 
 def test_the_robot_is_as_real_as_it_is_asked() -> None:
     """`--realism` is a name or a file, and the robot is else that of the configuration."""
-    asked = parse(["--out", "run", "--realism", "lab"]).settings.env.realism
-    assert asked == load_realism("lab") != parse(["--out", "run"]).settings.env.realism
-    with pytest.raises(ConfigError, match=r"no such name: 'lap', did you mean lab\?"):
-        parse(["--out", "run", "--realism", "lap"])
+    asked = parse_train(["--out", "run", "--realism", "lab"]).settings.env.realism
+    assert asked == load_realism("lab") != parse_train(["--out", "run"]).settings.env.realism
+    with refused("unknown name", "realism", value="'lap'", hint=", did you mean lab?"):
+        parse_train(["--out", "run", "--realism", "lap"])
 
 
 def test_a_gain_is_told_with_its_interval() -> None:

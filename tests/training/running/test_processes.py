@@ -14,7 +14,7 @@ import pytest
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.training.running.executor import Executor
-from poise.training.running.processes import Task, Worker, WorkerTraceback
+from poise.training.running.processes import PendingJob, Worker, WorkerTraceback
 
 
 class Unportable(Exception):
@@ -84,7 +84,7 @@ def test_a_worker_whose_main_process_has_gone_just_ends(
 ) -> None:
     """Nobody takes its result: it says nothing."""
     worker = Worker()
-    worker.give(Task(work, ("wait", tmp_path / "there")))
+    worker.give(PendingJob(work, ("wait", tmp_path / "there")))
     while not (tmp_path / "there").exists():
         time.sleep(0.02)
     worker.connection.close()

@@ -42,7 +42,7 @@ def test_the_command_has_no_folder_of_its_program(
 ) -> None:
     """Its arguments are as they were typed."""
     monkeypatch.setattr("sys.argv", [program, "evaluate", "zero", "--out", "my out"])
-    assert provenance.command() == "poise evaluate zero --out 'my out'"
+    assert provenance.command_line() == "poise evaluate zero --out 'my out'"
 
 
 def test_the_machine_is_named() -> None:

@@ -12,7 +12,7 @@ from poise.envs.compiled.maths.runs import runs_of
 from poise.envs.robots.models.tree import lineage
 from poise.envs.robots.robot import Robot
 
-from .record import Course
+from .record import TrialCourse
 
 SATURATED = 0.999  # of a motor's limit
 SATURATED_STEPS = 2  # consecutive policy steps at the limit from which a motor counts
@@ -32,9 +32,9 @@ class Diagnosis:
     loss_body: str | None = None  #: that touched the ground, where that is the criterion
     #: motor between root and soles that was first at its limit after the first push, for 2 policy
     #: steps or more in a row. Arms are swung as hard as they can be, which is no reason to fall
-    full_motor: str | None = None
-    full_from: float | None = None  #: when that began
-    full_time: float | None = None  #: how long it lasted then
+    saturated_motor: str | None = None
+    saturated_from: float | None = None  #: when that began
+    saturated_time: float | None = None  #: how long it lasted then
     capture_left: float | None = None  #: when the capture point left the support for the last time
     capture_outside: float | None = None  #: how far outside it came at most from then on [m]
     #: "slipped" (a sole moved by 3 cm while it stood) or "missed" (a foot landed 5 cm or more from
@@ -50,7 +50,7 @@ class Diagnosis:
 COLUMNS = tuple(Diagnosis.__dataclass_fields__)
 
 
-def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagnosis:
+def diagnose(env: BalanceEnv, course: TrialCourse, start: float, loss: str) -> Diagnosis:
     """Return why the trial that has just ended in `env` was lost.
 
     Args:
@@ -78,7 +78,7 @@ def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
         return Diagnosis("height")
     if uprightness(arrays, s) < env.limits.cos_tilt:
         return Diagnosis("tilt")
-    if env.limits.ground_contact and s.other_contacts[0] > 0.5:
+    if env.limits.ground_contact and s.other_contacts > 0.5:
         return Diagnosis("contact", loss_body=touching_body(env))
     return Diagnosis(loss)
 
@@ -95,7 +95,7 @@ def touching_body(env: BalanceEnv) -> str | None:
     return None
 
 
-def _saturated(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
+def _saturated(env: BalanceEnv, course: TrialCourse, start: float) -> dict[str, Any]:
     """Return the first saturated motor, from when and for how long."""
     full = (course.load > SATURATED) & (course.time > start)[:, None] & bearing(env.robot)
     lasting = [
@@ -109,9 +109,9 @@ def _saturated(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
     # of those that begin together the longest
     first, last, motor = min(lasting, key=lambda run: (run[0], -run[1]))
     return {
-        "full_motor": env.robot.motor_names[motor],
-        "full_from": _time(course, first),
-        "full_time": round((last - first) * env.config.policy_period, 6),
+        "saturated_motor": env.robot.motor_names[motor],
+        "saturated_from": _time(course, first),
+        "saturated_time": round((last - first) * env.config.policy_period, 6),
     }
 
 
@@ -124,10 +124,10 @@ def bearing(robot: Robot) -> np.ndarray:
     return np.isin(bodies, list(between))
 
 
-def _capture(course: Course) -> dict[str, Any]:
+def _capture(course: TrialCourse) -> dict[str, Any]:
     """When the capture point left the support for the last time, and how far it came."""
     pairs = zip(course.supports, course.capture_point, strict=True)
-    outside = np.array([distance_outside(polygon, point) for polygon, point in pairs])
+    outside = np.array([distance_outside_polygon(polygon, point) for polygon, point in pairs])
     inside = np.flatnonzero(outside <= 0.0)
     row = int(inside[-1]) + 1 if len(inside) else 0
     beyond = outside[row:]
@@ -137,7 +137,7 @@ def _capture(course: Course) -> dict[str, Any]:
     return {"capture_left": _time(course, row), "capture_outside": round(float(beyond.max()), 6)}
 
 
-def distance_outside(polygon: np.ndarray, point: np.ndarray) -> float:
+def distance_outside_polygon(polygon: np.ndarray, point: np.ndarray) -> float:
     """How far a point is outside a convex polygon (k, 2) [m]: 0 within, NaN of no polygon."""
     if len(polygon) < 3:  # no foot touches the ground, or one with an edge
         ways = np.linalg.norm(polygon - point, axis=1)
@@ -152,7 +152,7 @@ def distance_outside(polygon: np.ndarray, point: np.ndarray) -> float:
     return float(np.linalg.norm(away - along[:, None] * edges, axis=1).min())
 
 
-def _foothold(course: Course, start: float) -> dict[str, Any]:
+def _foothold(course: TrialCourse, start: float) -> dict[str, Any]:
     """Return the first slip or missed foothold after the first push."""
     for row in range(1, len(course.time)):
         if course.time[row] <= start:
@@ -165,7 +165,7 @@ def _foothold(course: Course, start: float) -> dict[str, Any]:
     return {}
 
 
-def _step_fault(course: Course, row: int, foot: int) -> tuple[str, float]:
+def _step_fault(course: TrialCourse, row: int, foot: int) -> tuple[str, float]:
     """What is wrong with a foot at a row, and by how much; empty if nothing is."""
     if not course.contacts[row, foot]:
         return "", 0.0
@@ -180,5 +180,5 @@ def _step_fault(course: Course, row: int, foot: int) -> tuple[str, float]:
     return ("slipped", moved) if moved > SLIPPED else ("", 0.0)
 
 
-def _time(course: Course, row: int) -> float:
+def _time(course: TrialCourse, row: int) -> float:
     return round(float(course.time[row]), 6)

@@ -11,13 +11,12 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.walking.simbicon import Simbicon
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import FAILURES
 
 UNSEEN = (PolicyFile, Simbicon)  #: they step without a readable plan
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class TrialCourse:
     """The course of a trial: n rows, one after the reset and one after every policy step."""
 
     time: np.ndarray  #: (n,) [s]
@@ -53,7 +52,7 @@ class CourseRecord:
     """
 
     def __init__(self) -> None:
-        self._rows: list[dict[str, Any]] = []  # of the fields of `Course`
+        self._rows: list[dict[str, Any]] = []  # of the fields of `TrialCourse`
         self._steps: SteppingController | None = None
 
     def __call__(self, env: BalanceEnv) -> None:
@@ -71,14 +70,16 @@ class CourseRecord:
         self._rows.append({
             "time": env.simulation.time, "load": np.abs(env.simulation.views.ctrl) / self._limit,
             "capture_point": s.capture_point.copy(),
-            "supports": s.support[: s.support_size[0]].copy(), "contacts": s.contacts > 0.5,
+            "supports": s.support[: s.support_size].copy(), "contacts": s.contacts > 0.5,
             "soles": s.sole_point[:, :2].copy(), "foothold": foothold, "swinging": foot,
-            "failures": float(env.episode.metrics[FAILURES]),
+            "failures": float(env.episode.metrics.failures),
         })  # fmt: skip
 
-    def course(self) -> Course:
+    def course(self) -> TrialCourse:
         """Return the record as arrays."""
-        columns = {name: [row[name] for row in self._rows] for name in Course.__dataclass_fields__}
+        columns = {
+            name: [row[name] for row in self._rows] for name in TrialCourse.__dataclass_fields__
+        }
         supports = columns.pop("supports")
         arrays = {name: np.array(column) for name, column in columns.items()}
-        return Course(supports=supports, **arrays)
+        return TrialCourse(supports=supports, **arrays)

@@ -23,7 +23,7 @@ LOSSES = {
 }
 NUMBERS = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
 #: column of a cause → column of its size
-SIZES = {"full_from": "full_time", "foothold_time": "foothold_error",
+SIZES = {"saturated_from": "saturated_time", "foothold_time": "foothold_error",
          "capture_left": "capture_outside"}  # fmt: skip
 DIRECTIONS = ("forward", "forward left", "left", "backward left", "backward", "backward right",
               "right", "forward right")  # fmt: skip
@@ -52,9 +52,10 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
     if fall_time is not None and d.loss not in ("not quiet", "off command"):
         end += f" at {fall_time:.2f} s"
     causes: list[tuple[float, str]] = []
-    if d.full_motor is not None and d.full_from is not None:
-        causes.append((d.full_from, f"{d.full_motor} at its limit from {d.full_from:.2f} s, for "
-                                  f"{d.full_time:.2f} s"))  # fmt: skip
+    if d.saturated_motor is not None and d.saturated_from is not None:
+        since, lasted = f"{d.saturated_from:.2f}", f"{d.saturated_time:.2f}"
+        causes.append((d.saturated_from, f"{d.saturated_motor} at its limit from {since} s, for "
+                                         f"{lasted} s"))  # fmt: skip
     if d.failures_from is not None:
         then = ", when it was falling already" if _fell_before(d) else ""
         causes.append(
@@ -79,9 +80,9 @@ def cause(d: Diagnosis, steps: int) -> str:
     first = "no motor of the legs at its limit"
     if d.hardware is not None:
         first = d.hardware
-    elif d.full_motor is not None:
-        first = f"{SIDE.sub('', d.full_motor).strip('_')} at its limit"
-    if d.failures_from is not None and d.failures_from <= (d.full_from or float("inf")):
+    elif d.saturated_motor is not None:
+        first = f"{SIDE.sub('', d.saturated_motor).strip('_')} at its limit"
+    if d.failures_from is not None and d.failures_from <= (d.saturated_from or float("inf")):
         first = first if _fell_before(d) else "QP without a solution"
     then = {0: "no planned step", 1: "one step was not enough"}.get(
         steps, "its steps were not enough"

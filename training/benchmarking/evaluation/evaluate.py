@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.console import Console
 
 from poise.baselines.allowance import allows
-from poise.baselines.registry import walking_controllers
+from poise.baselines.registry import available_controllers, walking_controllers
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder
 from poise.configs.reading import read_json, read_yaml
@@ -129,7 +129,7 @@ def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
     to `feedback-step`.
     """
     elsewhere = {REFERENCE, *RESTLESS, *walking_controllers()}
-    others = (name for name in packaged("controllers") if name not in elsewhere)
+    others = (name for name in available_controllers() if name not in elsewhere)
     policies = (name for name in packaged_policies(robot) if not walks(name))
     return (REFERENCE, *others, *policies)
 

@@ -17,10 +17,11 @@ from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_folder
 from poise.configs.reading import exists
 from poise.configs.schema import build, read_yaml, to_yaml
+from poise.configs.spellings import respelled
 from poise.configs.texts import check_shown
 from poise.envs.physics.pushes.sampler import LimitTable
 from poise.training.benchmarking.trials.table import COLUMNS
-from poise.training.benchmarking.trials.trial import Outcome
+from poise.training.benchmarking.trials.trial import FORMER, Outcome
 from poise.training.running.files import FILES, LOG, REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.log import TrialLog, read_log
@@ -156,8 +157,9 @@ def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:
     """Return outcomes by controller and number, and how many lines could not be read."""
     path = folder / LOG
     entries, damaged = read_log(path)
+    values = respelled([value for _, value in entries], FORMER, path)
     finished: dict[Key, Outcome] = {}
-    for key, value in entries:
+    for (key, _), value in zip(entries, values, strict=True):
         try:
             controller, number = key
             finished[str(controller), int(number)] = build(Outcome, value, str(path))

@@ -8,12 +8,12 @@ import numpy as np
 from poise.training.benchmarking.metrics.evaluated import (
     DIRECTIONAL,
     Evaluated,
-    ankle_limits,
     by_falls,
     fractions,
-    part,
+    limits_of_pushes,
     pushes,
     sectors,
+    trials_of_parts,
     won,
 )
 from poise.training.benchmarking.statistics.bootstrap import (
@@ -22,7 +22,7 @@ from poise.training.benchmarking.statistics.bootstrap import (
     mean_over_directions,
 )
 from poise.training.benchmarking.statistics.fits import fit_logistic
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.trials.step_limits import (
     COUNTS,
     DRAWN,
@@ -42,7 +42,7 @@ FEWEST = 5  # trials of a direction whose J50 is plotted
 
 def draw_plots(
     folder: Path,
-    plan: Plan,
+    plan: TrialPlan,
     evaluated: Mapping[str, Evaluated],
     steps: Mapping[str, NStepLimit] | None = None,
     timesteps: Mapping[str, int | None] | None = None,
@@ -55,17 +55,19 @@ def draw_plots(
     """
     polar, fall = (folder / name for name in PLOTS)
     limits = plan.limits
-    shown = {name: part(own, *DIRECTIONAL) for name, own in evaluated.items()}
+    shown = {name: trials_of_parts(own, *DIRECTIONAL) for name, own in evaluated.items()}
     directional = all(shown.values())
     if not directional:
-        shown = {name: part(own, "random") for name, own in evaluated.items()}
+        shown = {name: trials_of_parts(own, "random") for name, own in evaluated.items()}
         if not all(shown.values()):
             return []
     label = "push impulse, as a fraction of the ankle limit"
     if directional:
         fits = {name: mean_over_directions(*pushes(own)[:2], won(own))
                 for name, own in shown.items()}  # fmt: skip
-        fraction = {name: pushes(own)[1] / ankle_limits(own, limits) for name, own in shown.items()}
+        fraction = {
+            name: pushes(own)[1] / limits_of_pushes(own, limits) for name, own in shown.items()
+        }
         fine, duration = np.arange(0.0, 360.0, 2.0), plan.suite.push_duration
         around = limits.around(2.0)
         limit = [limits.ankle(d, duration) for d in around]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -18,6 +19,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
+from poise.configs.problems import out_of_range
 from poise.configs.schema import to_dict
 from poise.envs.physics.engines.config import MUJOCO, Physics, load_physics
 from poise.envs.physics.engines.engine import check_engine
@@ -30,7 +32,7 @@ from poise.training.benchmarking.metrics.motions import suite_repertoire, suite_
 from poise.training.benchmarking.metrics.pairs import pair_figures
 from poise.training.benchmarking.metrics.seed_groups import seed_groups
 from poise.training.benchmarking.suites.draw import MOST_TRIALS
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import (
     Agent,
@@ -38,13 +40,15 @@ from poise.training.benchmarking.trials.agents import (
     check_may_walk,
     check_walks,
     follows_no_motion,
+    stand_in,
 )
-from poise.training.benchmarking.trials.jobs import Job, play
+from poise.training.benchmarking.trials.jobs import Job, run_job
 from poise.training.benchmarking.trials.names import check_name
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit, curves, stepping_limits
 from poise.training.benchmarking.trials.table import trial_row
 from poise.training.benchmarking.trials.trial import Outcome, Trial
+from poise.training.benchmarking.trials.variants import level_of
 from poise.training.learning.seeds.records import expand_seeds
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS, plain
@@ -132,8 +136,8 @@ class Run:
             motions=self.repertoire.digests,
         )
 
-    def _plan(self, seed: int, names: Sequence[str], standing: Collection[str] = ()) -> Plan:
-        return Plan(self.suite, self.limits, seed, names, self.repertoire.durations, standing)
+    def _plan(self, seed: int, names: Sequence[str], standing: Collection[str] = ()) -> TrialPlan:
+        return TrialPlan(self.suite, self.limits, seed, names, self.repertoire.durations, standing)
 
     def play(self, plots: bool = False, timed: bool = False) -> Summary:
         """Run missing trials and write the result; return the summary."""
@@ -180,7 +184,7 @@ class Run:
     def _summary(
         self,
         folder: ResultFolder,
-        plan: Plan,
+        plan: TrialPlan,
         evaluated: Mapping[str, Evaluated],
         steps: Mapping[str, NStepLimit],
         ticks: Mapping[str, float | None],
@@ -193,6 +197,11 @@ class Run:
             entry["tick_us"], entry["fingerprint"] = ticks[name], settings.controllers[name]
             if (learned_from := self.agents[name].timesteps) is not None:
                 entry["timesteps"] = learned_from
+            found = (
+                stand_in(self.agents[name], level_of(t.conditions)) for t, _ in evaluated[name]
+            )
+            if others := Counter(each for each in found if each is not None):
+                entry["stand_ins"] = dict(others)
         first = next(iter(evaluated))
         reference = self.reference if self.reference and self.reference in evaluated else first
         pairs: Iterator[tuple[str, str]] = combinations(evaluated, 2)
@@ -231,7 +240,7 @@ class Run:
                     "folder", source=self.out, field="controllers",
                 )  # fmt: skip
 
-    def _play(self, folder: ResultFolder, plan: Plan) -> None:
+    def _play(self, folder: ResultFolder, plan: TrialPlan) -> None:
         """Run missing trials: the first stage, then the second, which depends on it."""
 
         def missing(pairs: Iterable[tuple[str, Trial]]) -> list[Job]:
@@ -257,7 +266,7 @@ class Run:
             executor = None
             for jobs in filter(None, stages()):
                 executor = executor or working.enter_context(self.executor)
-                for job, outcome in executor.each(play, jobs):
+                for job, outcome in executor.each(run_job, jobs):
                     folder.append(job.controller, job.trial.number, outcome)
                     rates.add(job.controller, outcome)
                     bar.update(task, completed=len(folder.finished), rates=str(rates))
@@ -303,12 +312,12 @@ def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | N
         check_name(name)
     for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
         if value is not None and value < least:
-            raise ConfigError(f"must be at least {least}, not {value}", field=name)
+            raise out_of_range(value, name, least=least)
     if trials is not None and trials > MOST_TRIALS:
         raise ConfigError(f"must be at most {MOST_TRIALS}", field="trials")
 
 
-def _check_engine(engine: Physics, robot: Robot, plan: Plan) -> None:
+def _check_engine(engine: Physics, robot: Robot, plan: TrialPlan) -> None:
     """Raise ConfigError where the engine cannot hold the robot, a trial's terrain or its bumps."""
     levels = dict.fromkeys(trial.conditions.realism for trial in plan.first)
     bumps = [Bumps() for level in levels if load_realism(level).bumpy]

@@ -63,7 +63,7 @@ def ranked(entries: Mapping[str, Entry]) -> list[str]:
     return sorted(entries, key=order)
 
 
-def places(
+def shared_ranks(
     entries: Mapping[str, Entry], measure: tuple[str, str] | None = None
 ) -> dict[str, int | None]:
     """Return the rank of each controller; equal printed results share one.
@@ -88,10 +88,10 @@ def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
     for key, form in (("j50_mean", ".1f"), ("fraction50", ".2f")):
         if all(key in entry for entry in entries.values()):
             return key, form
-    return ("never_fell_rate" if walked(entries) else "recovered_rate"), ".2f"
+    return ("never_fell_rate" if judged_by_falls(entries) else "recovered_rate"), ".2f"
 
 
-def walked(entries: Mapping[str, Entry]) -> bool:
+def judged_by_falls(entries: Mapping[str, Entry]) -> bool:
     """Return whether all are judged by falls, see `Entry.criterion`."""
     return all(entry.get("criterion") == CRITERION for entry in entries.values())
 
@@ -112,7 +112,7 @@ def print_summary(summary: Summary, console: Console) -> None:
         for heading, texts in table_cells(summary).items()
         if heading not in IN_PAIRS and not {*texts} <= {NONE, "0"}
     }
-    names, rank = summary["ranking"], places(summary["controllers"])
+    names, rank = summary["ranking"], shared_ranks(summary["controllers"])
     named = _room(names, 16)
     for k, part in enumerate(in_parts(cells, console.width - named - 2 * PADDING - 3)):
         table = Table(title=None if k else title, title_justify="left")
@@ -141,7 +141,7 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     if (half := replace(J50_SCALED, unit=f"× {summary['scale']}").heading) in headings:
         notes.append(f"{half}: half of the pushes of this size are recovered, with the 95 % "
                      "interval; larger is better")  # fmt: skip
-    if walked(summary["controllers"]):
+    if judged_by_falls(summary["controllers"]):
         notes.append(f"J50, the order and pairs of walks are by falls; {NOT_FALLEN.name} is of the "
                      f"pushes common to all; {AS_COMMANDED.name}: the last two strides are as near "
                      "to the command as the controller's own before the push, within 0.05 m/s and "
@@ -157,7 +157,17 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
         close = sum(p >= SEPARATED for p in p_values)
         notes.append(f"{P_VALUE.heading} ≥ {SEPARATED:g}: these trials do not separate the two"
                      f" ({close} of {len(p_values)} pairs)")  # fmt: skip
-    return notes
+    return [*notes, *stand_in_notes(summary)]
+
+
+def stand_in_notes(summary: Summary) -> list[str]:
+    """Return a line for each controller that another one has replaced in some trials."""
+    return [
+        f"{name}: {other} ran in its place in {count} of {entry['evaluated']} trials, as the "
+        f"controller's `uncertain` says for this realism"
+        for name, entry in summary["controllers"].items()
+        for other, count in entry.get("stand_ins", {}).items()
+    ]
 
 
 def print_lost(
@@ -196,7 +206,7 @@ def table_cells(summary: Summary) -> dict[str, list[str]]:
     rated = f", {summary['rated']}" if summary["rated"] else ""
     recovered = replace(RECOVERED, name=f"{RECOVERED.name}{rated}")
     rates = (recovered, NOT_FALLEN)
-    if walked(summary["controllers"]):
+    if judged_by_falls(summary["controllers"]):
         rates = (NOT_FALLEN, AS_COMMANDED)
     figures = (
         *(J50_WORST, ETA_MEAN, ETA_WORST),

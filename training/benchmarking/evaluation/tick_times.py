@@ -17,7 +17,7 @@ ROUNDS = 3  # in which every controller has its turn
 SECONDS = 0.6  # of simulated time in a round, with a push at its start
 
 
-class Clocked(WrappedController):
+class ClockedController(WrappedController):
     """A controller whose calls of `torques` are timed."""
 
     def __init__(self, controller: Controller, robot: Robot):
@@ -40,7 +40,7 @@ def clocked(env: BalanceEnv) -> Iterator[list[float]]:
         yield []
         return
     inner = env.controller
-    clock = env.controller = Clocked(inner, env.robot)
+    clock = env.controller = ClockedController(inner, env.robot)
     try:
         yield clock.seconds
     finally:

@@ -11,12 +11,12 @@ from poise.training.benchmarking.statistics.bootstrap import mean_over_direction
 from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.statistics.eurobench import HUMAN_COM_HEIGHT
 from poise.training.benchmarking.statistics.rates import eta
-from poise.training.benchmarking.suites.plan import Plan, at_level
+from poise.training.benchmarking.suites.plan import TrialPlan, at_level
 from poise.training.benchmarking.suites.scenarios import PART as SCENARIOS
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit
-from poise.training.benchmarking.trials.trial import won as is_won
+from poise.training.benchmarking.trials.trial import counts_as_won as is_won
 from poise.training.running.summary import (
     Direction,
     Entry,
@@ -31,17 +31,17 @@ from poise.training.running.trial_figures import NOT_FALLEN, RECOVERED, Scenario
 from .evaluated import (
     DIRECTIONAL,
     Evaluated,
-    ankle_limits,
     by_falls,
     cells,
     counts,
     fitted,
     fractions,
+    limits_of_pushes,
     once,
-    part,
     pushes,
     rated,
     sectors,
+    trials_of_parts,
     won,
 )
 from .factors import eurobench_figures, factor_figures
@@ -52,37 +52,39 @@ from .walking import phase_figures, walk_levels
 RANDOM = ("random", "mix")  # parts that the rates of a level are of, where a suite has one
 
 
-def controller_entry(evaluated: Evaluated, plan: Plan, steps: NStepLimit | None = None) -> Entry:
+def controller_entry(
+    evaluated: Evaluated, plan: TrialPlan, steps: NStepLimit | None = None
+) -> Entry:
     """All figures of one controller; `steps` is the limit of one that steps."""
     everything, evaluated = evaluated, once(evaluated)
     entry: Entry = {
         **counts(rated(evaluated)),
         "criterion": NOT_FALLEN if by_falls(rated(evaluated)) else RECOVERED,
         "root_force_max": max((outcome.root_force or 0.0) for _, outcome in evaluated),
-        "played": len(everything),
+        "evaluated": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
     if found := losses((o, o.steps) for t, o in evaluated if not is_won(t, o)):
         entry["losses"] = found
-    if directional := part(evaluated, *DIRECTIONAL):
+    if directional := trials_of_parts(evaluated, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))
-    if pushed := part(evaluated, "walk_push"):
+    if pushed := trials_of_parts(evaluated, "walk_push"):
         entry["phases"] = phase_figures(pushed, entry)
     if walks := walk_levels(evaluated, plan.suite.duration):
         entry["walks"] = walks
     if motions := motion_levels(evaluated):
         entry["motions"], entry["in_motion"] = motions, in_motion(evaluated)
-    if scenarios := _scenarios(part(evaluated, SCENARIOS)):
+    if scenarios := _scenarios(trials_of_parts(evaluated, SCENARIOS)):
         entry["scenarios"] = scenarios
-    if sustained := part(evaluated, "sustained"):
+    if sustained := trials_of_parts(evaluated, "sustained"):
         entry["sustained"] = sustained_figures(sustained, plan.limits.robot.mass)
-    if gusts := part(evaluated, "gusts"):
+    if gusts := trials_of_parts(evaluated, "gusts"):
         entry["gusts"] = gust_figures(gusts)
-    if random := part(evaluated, "random"):
+    if random := trials_of_parts(evaluated, "random"):
         entry.update(_fractions(random, plan.limits))
-    if factors := factor_figures(part(evaluated, "factors"), plan.standard):
+    if factors := factor_figures(trials_of_parts(evaluated, "factors"), plan.standard):
         entry["factors"] = factors
-    if part(evaluated, "envelope", "margin"):
+    if trials_of_parts(evaluated, "envelope", "margin"):
         entry["eurobench"] = eurobench_figures(evaluated, plan.limits)
     if plan.suite.levels:
         entry["levels"] = _levels(everything, plan.suite)
@@ -95,7 +97,7 @@ def envelope(
     """J50 [N·s], J90, η and the fraction of the limit of `steps` in each direction; their means."""
     direction, impulse, duration = pushes(evaluated)
     recovered, mass = won(evaluated), limits.robot.mass
-    over_limit = impulse / ankle_limits(evaluated, limits)
+    over_limit = impulse / limits_of_pushes(evaluated, limits)
     fit = mean_over_directions(direction, impulse, recovered)
     etas = mean_over_directions(direction, over_limit, recovered)
     ankle = [limits.ankle(angle, float(duration[0])) for angle in fit.directions]
@@ -165,7 +167,9 @@ def _levels(evaluated: Evaluated, suite: Suite) -> list[RealismLevel]:
     """Of the suite's own level, then of each of its `levels`; J50 also over that of the first."""
 
     def named(names: Sequence[str], level: str | None) -> Evaluated:
-        return part(evaluated, *(n if level is None else at_level(n, level) for n in names))
+        return trials_of_parts(
+            evaluated, *(n if level is None else at_level(n, level) for n in names)
+        )
 
     found: list[RealismLevel] = []
     for level in (None, *suite.levels):

@@ -14,8 +14,8 @@ from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.benchmarking.trials.trial import won as is_won
-from poise.training.running.trial_figures import Counts, Rate, Rising
+from poise.training.benchmarking.trials.trial import counts_as_won as is_won
+from poise.training.running.trial_figures import Counts, Rate, RisingFigures
 
 Key = TypeVar("Key")
 Evaluated = Sequence[tuple[Trial, Outcome]]  # of one controller, ordered by number
@@ -25,7 +25,7 @@ DIRECTIONAL = ("envelope", "grid", WALK_PUSH)  # parts that J50 of each directio
 SECTOR = 45.0  # [deg] in which random directions are counted together
 
 
-def part(evaluated: Evaluated, *names: str) -> Evaluated:
+def trials_of_parts(evaluated: Evaluated, *names: str) -> Evaluated:
     """Return the trials of some parts."""
     return [(trial, outcome) for trial, outcome in evaluated if trial.part in names]
 
@@ -40,7 +40,7 @@ def rated(evaluated: Evaluated) -> Evaluated:
 
     Of pushed walks only the first stage counts: the second is harder for better controllers.
     """
-    return part(evaluated, *RATED) or met_by_all(once(evaluated))
+    return trials_of_parts(evaluated, *RATED) or met_by_all(once(evaluated))
 
 
 def met_by_all(evaluated: Evaluated) -> Evaluated:
@@ -156,7 +156,7 @@ def counts(evaluated: Evaluated) -> Counts:
     }
 
 
-def rising(outcomes: Sequence[Outcome]) -> Rising:
+def rising(outcomes: Sequence[Outcome]) -> RisingFigures:
     """Of the robots that were down and watched, the fraction that was up again, and when."""
     watched = [outcome for outcome in outcomes if outcome.up_again is not None]
     if not watched:
@@ -171,7 +171,7 @@ def rising(outcomes: Sequence[Outcome]) -> Rising:
     }
 
 
-def ankle_limits(evaluated: Evaluated, limits: PushLimits) -> np.ndarray:
+def limits_of_pushes(evaluated: Evaluated, limits: PushLimits) -> np.ndarray:
     """Return the ankle limit [N·s] for the push of every trial."""
     direction, _, duration = pushes(evaluated)
     return np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])

@@ -14,7 +14,7 @@ from poise.training.benchmarking.suites.factors import STANDARD
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.running.summary import Eurobench, Factor, Level, MarginFigures
 
-from .evaluated import Evaluated, cells, part, pushes, rate, won
+from .evaluated import Evaluated, cells, pushes, rate, trials_of_parts, won
 
 NAMED = ("body", "realism")  # factors whose levels are names, not numbers
 
@@ -51,13 +51,13 @@ def _level(level: str, evaluated: Evaluated, base: Evaluated) -> Level:
 
 def eurobench_figures(evaluated: Evaluated, limits: PushLimits) -> Eurobench:
     """Return the sway and recovery time over recovered standard pushes; stability margins."""
-    plain = [outcome for _, outcome in part(evaluated, "envelope") if outcome.recovered]
+    plain = [outcome for _, outcome in trials_of_parts(evaluated, "envelope") if outcome.recovered]
     return {
         "body_sway_mean": mean_or_none([outcome.sway for outcome in plain]),
         "recovery_time_mean": mean_or_none([outcome.sway_recovery for outcome in plain]),
         "recovery_time_trials": sum(outcome.sway_recovery is not None for outcome in plain),
         "trials": len(plain),
-        "margins": _margins(part(evaluated, "margin"), limits),
+        "margins": _margins(trials_of_parts(evaluated, "margin"), limits),
     }
 
 

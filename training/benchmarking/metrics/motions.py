@@ -6,50 +6,55 @@ from typing import Any, cast
 
 import numpy as np
 
+from poise.baselines.extras import load_extra
 from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
 from poise.training.benchmarking.statistics.differences import ratio
 from poise.training.benchmarking.statistics.rates import mean_or_none, wilson_interval
 from poise.training.benchmarking.suites.motions import PART, STANDING
 from poise.training.benchmarking.suites.suite import Suite
-from poise.training.benchmarking.trials.jobs import Stage
+from poise.training.benchmarking.trials.jobs import LONGEST, TrialStage
+from poise.training.benchmarking.trials.repertoire import Repertoire, kept
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.motion.following.follow import LONGEST
-from poise.training.motion.following.repertoire import (
-    Repertoire,
-    is_clip,
-    kept,
-    load_repertoire,
-)
 from poise.training.running.trial_figures import InMotion, MotionLevel, MotionMeans
 
-from .evaluated import Evaluated, cells, fitted, part, pushes, won
+from .evaluated import Evaluated, cells, fitted, pushes, trials_of_parts, won
 
+PERFORMS = "a suite that performs motions"
 MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level has the mean of
 
 
 def suite_repertoire(suite: Suite, robot: Robot, folder: Path, overwrite: bool) -> Repertoire:
-    """Return the motions of a suite, empty where it has none; raise as `load_repertoire`."""
+    """Return the motions of a suite, empty where it has none.
+
+    Raises:
+        MissingExtra: poise[motion] is not installed.
+        ConfigError: as `load_repertoire` of `training/motion/following/repertoire.py`.
+    """
     if suite.motions is None:
         return Repertoire({}, {}, {})
-    return load_repertoire(suite.motions.names, suite.motions.labels, robot, folder, overwrite)
+    names, labels = suite.motions.names, suite.motions.labels
+    load = load_extra("motions", "repertoire", PERFORMS)
+    repertoire: Repertoire = load(names, labels, robot, folder, overwrite)
+    return repertoire
 
 
-def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
+def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> TrialStage:
     """What all trials of a suite share, whose results are in `folder`."""
     chosen = suite.motions
     if chosen is None:
         again = suite.get_up_time or (None if suite.get_up is None else 0.0)
-        return Stage(robot, suite.duration, suite.noise, get_up=again, physics=suite.physics)
+        return TrialStage(robot, suite.duration, suite.noise, get_up=again, physics=suite.physics)
+    is_clip = load_extra("motions", "is_clip", PERFORMS)
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(chosen.names, chosen.labels, strict=True)]  # fmt: skip
     motions = ((STANDING, STANDING), *files)
-    return Stage(robot, LONGEST, suite.noise, motions, chosen.tempo, physics=suite.physics)
+    return TrialStage(robot, LONGEST, suite.noise, motions, chosen.tempo, physics=suite.physics)
 
 
 def motion_levels(evaluated: Evaluated) -> list[MotionLevel]:
     """Every share of J50: each motion, and all of several; [] where nothing is performed."""
-    moving = part(evaluated, PART)
+    moving = trials_of_parts(evaluated, PART)
     found: dict[tuple[float, str | None], list[tuple[Trial, Outcome]]] = {}
     found |= cells(moving, lambda trial: (trial.share or 0.0, trial.motion))
     if len({trial.motion for trial, _ in moving}) > 1:
@@ -81,7 +86,7 @@ def in_motion(evaluated: Evaluated) -> list[InMotion]:
     Shares of all directions are fitted together. The ratio of two such shares is that of the J50s,
     since both are of the same one. Its interval comes of those of the two [Zou08].
     """
-    moving = part([(t, o) for t, o in evaluated if t.push is not None], PART)
+    moving = trials_of_parts([(t, o) for t, o in evaluated if t.push is not None], PART)
     if not moving:
         return []
     shares = np.array([trial.share for trial, _ in moving], dtype=float)
@@ -109,7 +114,7 @@ def in_motion(evaluated: Evaluated) -> list[InMotion]:
 
 def _standing(evaluated: Evaluated, moving: Evaluated) -> EnvelopeFit | None:
     """Return the fit of the pushes while standing; None without any."""
-    stood = part(evaluated, STANDING)
+    stood = trials_of_parts(evaluated, STANDING)
     if not stood:
         return None
     j50 = {t.push.direction: t.push.impulse / t.share for t, _ in moving if t.push and t.share}

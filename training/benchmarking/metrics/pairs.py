@@ -7,10 +7,10 @@ from poise.training.benchmarking.statistics.bootstrap import j50_gain
 from poise.training.benchmarking.statistics.differences import paired_rates, relative_gain
 from poise.training.benchmarking.statistics.rates import mcnemar
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.benchmarking.trials.trial import won as is_won
+from poise.training.benchmarking.trials.trial import counts_as_won as is_won
 from poise.training.running.summary import Entry, Pair, Paired
 
-from .evaluated import DIRECTIONAL, Evaluated, part, pushes, rated, won
+from .evaluated import DIRECTIONAL, Evaluated, pushes, rated, trials_of_parts, won
 
 
 def pair_figures(
@@ -29,7 +29,9 @@ def pair_figures(
         one == two for _, one, two in met
     )
     if "j50_mean" in entries[a] and "j50_mean" in entries[b]:
-        _add_gain(pair, [part(evaluated[name], *DIRECTIONAL) for name in (a, b)], entries)
+        _add_gain(
+            pair, [trials_of_parts(evaluated[name], *DIRECTIONAL) for name in (a, b)], entries
+        )
     return pair
 
 

@@ -10,7 +10,7 @@ from poise.training.benchmarking.suites.walking import WALKING
 from poise.training.running.summary import EnvelopeFigures
 from poise.training.running.trial_figures import PhaseJ50, StepsAsCommanded, WalkLevel, WalkMeans
 
-from .evaluated import Evaluated, cells, met_by_all, part, rate, won
+from .evaluated import Evaluated, cells, met_by_all, rate, trials_of_parts, won
 
 PHASES = 8  # of a stride
 STEP_TOLERANCE = 0.1  # largest error of a step parameter as commanded, as a fraction
@@ -24,7 +24,7 @@ def walk_levels(evaluated: Evaluated, duration: float) -> list[WalkLevel]:
 
     Of pushes whose J50 is measured, only the first stage, common to all controllers.
     """
-    walked = met_by_all(part(evaluated, *WALKING))
+    walked = met_by_all(trials_of_parts(evaluated, *WALKING))
     found = cells(walked, lambda trial: (trial.part, str(trial.level)))
     return [_level(*key, own, duration) for key, own in found.items()]
 
@@ -40,7 +40,7 @@ def _level(name: str, text: str, evaluated: Evaluated, duration: float) -> WalkL
     steps: StepsAsCommanded = {}
     if name == "gait":
         kept = [each.upright and (each.step_error or 0.0) <= STEP_TOLERANCE for each in outcomes]
-        steps = {"steps_as_told_rate": sum(kept) / len(kept)}
+        steps = {"steps_as_commanded_rate": sum(kept) / len(kept)}
     return {
         "part": name,
         "level": text,

@@ -12,7 +12,7 @@ from poise.training.benchmarking.evaluation.tables import ranked
 from poise.training.benchmarking.metrics.entry import controller_entry
 from poise.training.benchmarking.metrics.evaluated import Evaluated
 from poise.training.benchmarking.metrics.pairs import pair_figures
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.table import read_outcome, read_trial
@@ -42,7 +42,7 @@ def judged_again(
         robot = load_robot(settings.robot)
         if robot.fingerprint != settings.robot_fingerprint:
             raise ConfigError("the robot has changed since")
-        plan = Plan(suite, PushLimits(robot, settings.limits), settings.seed,
+        plan = TrialPlan(suite, PushLimits(robot, settings.limits), settings.seed,
                     tuple(summary["controllers"]))  # fmt: skip
     except PoiseError as error:
         warnings.warn(f"{folder}: walks of an older result count as lost where they differ from "
@@ -70,7 +70,7 @@ def judged_again(
     return plain(whole)
 
 
-def _entry(before: Entry, evaluated: Evaluated, plan: Plan) -> Entry:
+def _entry(before: Entry, evaluated: Evaluated, plan: TrialPlan) -> Entry:
     entry = controller_entry(evaluated, plan)
     kept = {key: before[key] for key in KEPT if key in before}  # type: ignore[literal-required]
     return {**entry, **kept}  # type: ignore[typeddict-item]

@@ -9,7 +9,12 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_file, is_folder
 from poise.configs.texts import code, plain
-from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_cells
+from poise.training.benchmarking.evaluation.tables import (
+    IN_PAIRS,
+    ranked,
+    shared_ranks,
+    table_cells,
+)
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
     AIMED,
@@ -166,7 +171,7 @@ def _ranking(summary: Summary) -> Table:
     cells[CHATTER.heading] = [CHATTER.text(entries[name]) for name in names]
     at_levels = [dict(_realism(entries[name])) for name in names]
     cells |= {level: [own.get(level, NONE) for own in at_levels] for level in at_levels[0]}
-    rank = places(entries)
+    rank = shared_ranks(entries)
     rows = [
         [str(rank[name] or NONE), code(name), *texts]
         for name, texts in zip(names, zip(*cells.values(), strict=True), strict=True)
@@ -187,12 +192,19 @@ def _realism(entry: Entry) -> Iterator[tuple[str, str]]:
 
 
 def _factors(summary: Summary) -> Table:
+    """Return the recovered rates at each level: the standard's once, since its trials are those of
+    every factor, and no realism levels, which are columns of the ranking."""
     names = summary["ranking"]
     found = [summary["controllers"][name].get("factors", []) for name in names]
+    standard: dict[tuple[str, ...], list[str]] = {}
     rows = []
     for factors in zip(*found, strict=True):
         for levels in zip(*(factor["levels"] for factor in factors), strict=True):
-            mark = " (standard)" if levels[0]["standard"] else ""
-            rates = (f"{level['recovered_rate']:.0%}" for level in levels)
-            rows.append([plain(factors[0]["factor"]), plain(levels[0]["level"]) + mark, *rates])
-    return ["factor", "level", *(code(name) for name in names)], rows
+            factor, level = plain(factors[0]["factor"]), plain(levels[0]["level"])
+            rates = tuple(f"{level['recovered_rate']:.0%}" for level in levels)
+            if levels[0]["standard"]:
+                standard.setdefault(rates, []).append(f"{factor} {level}")
+            elif factors[0]["factor"] != "realism":
+                rows.append([factor, level, *rates])
+    first = [["standard", ", ".join(where), *rates] for rates, where in standard.items()]
+    return ["factor", "level", *(code(name) for name in names)], [*first, *rows]

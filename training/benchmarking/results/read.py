@@ -8,12 +8,13 @@ from pathlib import Path
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import is_file, is_folder, read_table
+from poise.configs.spellings import respelled
 from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
 from poise.training.benchmarking.diagnosis.words import diagnosis_of, why
 from poise.training.benchmarking.evaluation.folder import Settings, read_settings
 from poise.training.benchmarking.metrics.evaluated import WALK_PUSH
 from poise.training.benchmarking.trials.table import CASE_COLUMNS, COLUMNS, read_trial
-from poise.training.benchmarking.trials.trial import Trial
+from poise.training.benchmarking.trials.trial import FORMER, Trial
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
 from poise.training.running.summary import Summary
 
@@ -155,6 +156,8 @@ def load_results(folder: str | Path) -> Results:
 def _records(path: Path) -> tuple[Record, ...]:
     columns, lines = read_table(path, ": run the same command again, it rewrites the file "
                                 "without running a trial")  # fmt: skip
+    lines = respelled(lines, FORMER, path)
+    columns = tuple(FORMER.get(name, name) for name in columns)
     lacking = [name for name in COLUMNS if name not in (*columns, *LATER)]
     if lacking:
         raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
@@ -194,9 +197,9 @@ def _check(folder: Path, settings: Settings, summary: Summary, records: tuple[Re
                               source=folder / TRIALS, field="controller")  # fmt: skip
         counts[record.controller] += 1
     for name, entry in entries.items():
-        if counts[name] != entry["played"]:
+        if counts[name] != entry["evaluated"]:
             raise ConfigError(
                 f"has {counts[name]} trials of {shown(name)}, but {SUMMARY} has "
-                f"{entry['played']}: cut off?",
+                f"{entry['evaluated']}: cut off?",
                 source=folder / TRIALS,
             )

@@ -15,7 +15,7 @@ from poise.training.benchmarking.metrics.motions import suite_stage
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.agents import Agent
 from poise.training.benchmarking.trials.play import run_trial
-from poise.training.benchmarking.trials.signals import Signals
+from poise.training.benchmarking.trials.signals import TrialSignals
 from poise.training.benchmarking.trials.table import outcome_cells
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.benchmarking.trials.variants import AgentVariants
@@ -69,7 +69,7 @@ def replay(
         record = results.record(name, trial)
         again = results.trial(record)
         agent = player(results, name, again)
-    signals = Signals() if plot is not None else None
+    signals = TrialSignals() if plot is not None else None
     watches = [each for each in (signals, watch) if each is not None]
     outcome = run_trial(agent, again, lambda env: [each(env) for each in watches])
     differences = {
@@ -85,7 +85,7 @@ def replay(
     return Replay(again, name, outcome, differences)
 
 
-def _draw(signals: Signals, path: Path, trial: Trial, title: str) -> None:
+def _draw(signals: TrialSignals, path: Path, trial: Trial, title: str) -> None:
     from poise.training.pictures.figures.time_series import trial_timeseries
 
     pushes = [(push.start, push.duration) for push in trial.pushes]

@@ -7,10 +7,13 @@ from typing import Any
 from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import is_file, read_json
 from poise.configs.schema import checked
+from poise.configs.spellings import respelled
 from poise.configs.texts import check_shown
 from poise.training.running.summary import Summary, check_format
 from poise.training.running.trial_figures import Rate
 
+#: older name → name of keys, see `respelled`
+FORMER = {"played": "evaluated", "steps_as_told_rate": "steps_as_commanded_rate"}
 #: keys of an entry that are there together or not at all
 ENTRY = (
     ("directions", "j50_mean", "j50_mean_ci95", "j50_mean_per_mass", "j50_min", "j50_bounded",
@@ -30,6 +33,7 @@ def read_summary(path: str | Path) -> Summary:
         raise ConfigError("cannot be read (no such file): not a finished result", source=path)
     data = read_json(path)
     check_format(data.get("format"), path)
+    data = respelled(data, FORMER, path, free="controllers")
     for field, value in _values(data):
         _check_value(field, value, path)
     summary = checked(Summary, data, path)

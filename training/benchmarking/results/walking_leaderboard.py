@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from poise.configs.errors import ConfigError
 from poise.configs.texts import code, plain
-from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text, places
+from poise.envs.physics.engines.config import MUJOCO
+from poise.envs.sensing.realism import IDEAL
+from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text, shared_ranks
 from poise.training.benchmarking.statistics.rates import poisson_interval
 from poise.training.running.columns import (
     COSTS,
@@ -23,7 +26,7 @@ from poise.training.running.trial_figures import NOT_FALLEN, WalkLevel
 from .pages import Table, check_alike, direction_table, page_of
 
 OF_J50 = ("j50", "j90", "eta", "directions")  # how the keys of J50's figures begin
-UNPUSHED, PUSHED = "walk", "walk_push"
+UNPUSHED, PUSHED, KICKED = "walk", "walk_push", "walk_kick"
 
 
 def is_of_walks(summary: Summary) -> bool:
@@ -35,14 +38,30 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
     """Return the page as Markdown; `summaries` by where they come from, of one suite, seed and
     robot.
 
-    A controller of a later result takes the place of an earlier one of its name. The order is that
-    of the mean J50 [N·s], those without one last. Raises ConfigError for results of another suite,
-    seed or robot than the first, and for a controller without walks of the first one's commands.
+    Each realism level has tables of its own. A controller of a later result takes the place of an
+    earlier one of its name and level. The order is that of the mean J50 [N·s], those without one
+    last. Raises ConfigError for results of another suite, seed, robot or engine than the first,
+    and for a controller without walks of the first one's commands.
     """
     check_alike(summaries, lambda of: {
-        "suite": of["suite"], "seed": of["seed"],
+        "suite": of["suite"], "seed": of["seed"], "physics": of.get("physics", MUJOCO),
         "robot.name": of["robot"]["name"], "robot.mass": of["robot"]["mass"],
     })  # fmt: skip
+    first, *_ = summaries.values()
+    levels: dict[str, dict[str, Summary]] = {}
+    for source, summary in summaries.items():
+        levels.setdefault(summary.get("realism", IDEAL), {})[source] = summary
+    return page_of(
+        "walks.md.j2",
+        source=" ".join(summaries),
+        first=first,
+        heading=J50.heading,
+        levels={level: _of_level(results) for level, results in levels.items()},
+    )
+
+
+def _of_level(summaries: Mapping[str, Summary]) -> dict[str, Any]:
+    """Return what the page says of the results of one realism level."""
     first, *_ = summaries
     entries: dict[str, Entry] = {}
     origin: dict[str, str] = {}
@@ -57,20 +76,16 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
                               field=f"controllers.{name}")  # fmt: skip
     names = sorted(entries, key=lambda name: _order(entries[name]))
     older = [name for name in names if entries[name].get("criterion") != NOT_FALLEN]
-    return page_of(
-        "walks.md.j2",
-        source=" ".join(summaries),
-        first=summaries[first],
-        j50=_pushed(entries),
-        older=older if len(older) < len(names) else [],
-        by_falls=len(older) < len(names),
-        ranking=_ranking(entries, names),
-        commands={command: _walks(entries, names, command) for command in commands},
-        heading=J50.heading,
-        directions=direction_table(entries, names, OF_DIRECTION),
-        results=[(summary, [name for name in summary["controllers"] if origin[name] == source])
-                for source, summary in summaries.items()],
-    )  # fmt: skip
+    return {
+        "j50": _pushed(entries),
+        "older": older if len(older) < len(names) else [],
+        "by_falls": len(older) < len(names),
+        "ranking": _ranking(entries, names),
+        "commands": {command: _walks(entries, names, command) for command in commands},
+        "directions": direction_table(entries, names, OF_DIRECTION),
+        "results": [(summary, [name for name in summary["controllers"] if origin[name] == source])
+                    for source, summary in summaries.items()],
+    }  # fmt: skip
 
 
 def _pushed(entries: Mapping[str, Entry]) -> str:
@@ -113,10 +128,12 @@ def _by_one_verdict(entries: Mapping[str, Entry]) -> dict[str, Entry]:
 
 
 def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
+    kicks = list(dict.fromkeys(
+        level["level"] for name in names for level in _levels(entries[name], KICKED)))  # fmt: skip
     head = ["", "controller", J50_MEAN.heading, J50_PER_MASS.unit, "worst direction",
-            "not fallen, pushed", "as commanded again", "fell unpushed", "falls a minute",
-            "as commanded, unpushed"]  # fmt: skip
-    rank, rows = places(entries, ("j50_mean", ".1f")), []
+            "not fallen, pushed", "as commanded again", *(f"kicked {kick}" for kick in kicks),
+            "fell unpushed", "falls a minute", "as commanded, unpushed"]  # fmt: skip
+    rank, rows = shared_ranks(entries, ("j50_mean", ".1f")), []
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
         fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)
@@ -124,7 +141,9 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
         low, high = poisson_interval(fallen)
         rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
                 if minutes else NONE)  # fmt: skip
+        kicked = {level["level"]: level for level in _levels(entry, KICKED)}
         rows.append([str(rank[name] or NONE), code(name), *_j50(entry), *_pushes(entry),
+                     *(_upright(kicked.get(kick)) for kick in kicks),
                      f"{fallen} of {trials}", rate, f"{followed} of {trials}"])  # fmt: skip
     return head, rows
 
@@ -146,8 +165,12 @@ def _pushes(entry: Entry) -> tuple[str, str]:
     if not levels:
         return NONE, NONE
     trials = sum(w["trials"] for w in levels)
-    upright = sum(round(w["never_fell_rate"] * w["trials"]) for w in levels)
+    upright = trials - sum(w["fallen"] for w in levels)
     return f"{upright} of {trials}", f"{sum(w['recovered'] for w in levels)} of {trials}"
+
+
+def _upright(level: WalkLevel | None) -> str:
+    return f"{level['trials'] - level['fallen']} of {level['trials']}" if level else NONE
 
 
 #: of a command; a page has room for two digits of steps

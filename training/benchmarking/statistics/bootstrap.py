@@ -41,7 +41,7 @@ class EnvelopeFit:
 
 
 @dataclass(frozen=True)
-class Gain:
+class RelativeGain:
     """J50 of a candidate over that of a reference, minus one; NaN where the latter is zero."""
 
     relative: float
@@ -52,9 +52,9 @@ class Gain:
 class EnvelopeGain:
     """Gain of the mean J50 over directions, and the gain in each direction."""
 
-    mean: Gain
+    mean: RelativeGain
     directions: tuple[float, ...]
-    gains: tuple[Gain, ...]
+    gains: tuple[RelativeGain, ...]
 
 
 def mean_over_directions(
@@ -142,7 +142,7 @@ def j50_gain(
     return EnvelopeGain(mean, directions, tuple(gains))
 
 
-def _gain(j50: ArrayLike, replicates: ArrayLike, freedom: tuple[int, int]) -> Gain:
+def _gain(j50: ArrayLike, replicates: ArrayLike, freedom: tuple[int, int]) -> RelativeGain:
     """Return the gain from J50 of reference and candidate, (2,), and their replicates, (2,
     resamples)."""
 
@@ -150,7 +150,7 @@ def _gain(j50: ArrayLike, replicates: ArrayLike, freedom: tuple[int, int]) -> Ga
         one, two = np.asarray(pair)
         return np.divide(two - one, one, out=np.full_like(one, np.nan), where=one > 0)
 
-    return Gain(float(relative(j50)), percentile_interval(relative(replicates), freedom))
+    return RelativeGain(float(relative(j50)), percentile_interval(relative(replicates), freedom))
 
 
 def _resample(trials: int, resamples: int, seed: np.random.SeedSequence) -> np.ndarray:

@@ -10,11 +10,11 @@ from poise.envs.physics.pushes.sampler import Range
 from poise.training.benchmarking.statistics.fits import LogisticFit, fit_logistic
 from poise.training.benchmarking.trials.trial import Trial
 
-from .draw import MOST_TRIALS, Draw, Part, Recovered, repeated
+from .draw import MOST_TRIALS, Draw, Recovered, SuitePart, repeated
 
 
 @dataclass(frozen=True)
-class Envelope(Part):
+class Envelope(SuitePart):
     """J50 in each of many directions, in two stages.
 
     The first spreads `first_trials` impulses over the whole range, one in each of as many equal
@@ -104,7 +104,7 @@ class Envelope(Part):
 
 
 @dataclass(frozen=True)
-class Grid(Part):
+class Grid(SuitePart):
     """Every magnitude in every direction, `repeats` times from differently disturbed starts."""
 
     directions: int = field(default=8, metadata={"min": 1, "max": 3600})
@@ -135,7 +135,7 @@ class Grid(Part):
 
 
 @dataclass(frozen=True)
-class Margin(Part):
+class Margin(SuitePart):
     """Equal pushes, repeated from differently disturbed starts: EUROBENCH's stability margin."""
 
     directions: tuple[float, ...] = field(

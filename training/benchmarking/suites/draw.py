@@ -141,7 +141,7 @@ class Draw:
 
 
 @dataclass(frozen=True)
-class Part:
+class SuitePart:
     """A part of a suite: trials of one kind. Their `part` is its name in the suite, unless set."""
 
     SIZE: ClassVar[str] = "trials"  # the field that says how many

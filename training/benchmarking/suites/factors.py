@@ -10,7 +10,7 @@ from poise.envs.robots.ground import contact_friction
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.trial import STANDARD_CONDITIONS, Conditions, Trial
 
-from .draw import MOST_TRIALS, Draw, Part, check_rising, generator, start_seed
+from .draw import MOST_TRIALS, Draw, SuitePart, check_rising, generator, start_seed
 
 STANDARD = "standard"  # factor and level of the case that levels are compared with
 
@@ -31,7 +31,7 @@ class Levels:
 
 
 @dataclass(frozen=True)
-class Cell:
+class FactorLevel:
     """A level of a factor, and what a trial has there. None: as in the standard case."""
 
     factor: str
@@ -51,7 +51,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Factors(Part):
+class Factors(SuitePart):
     """One factor at a time; all levels share starts, directions and fractions."""
 
     trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})  # per level
@@ -75,22 +75,28 @@ class Factors(Part):
                 trials.append(replace(trial, seed=start_seed(draw.seed, number + k)))
         return trials
 
-    def _cells(self, draw: Draw) -> list[Cell]:
+    def _cells(self, draw: Draw) -> list[FactorLevel]:
         levels, first, standard = self.levels, draw.bodies[0], standard_levels(draw)
-        cells = [Cell("duration", f"{d:g}", duration=d) for d in levels.duration]
-        cells += [Cell("body", body, body=body) for body in (draw.bodies if levels.body else ())]
-        cells += [Cell("height", f"{h:.2f}", point=draw.point(first, h)) for h in levels.height]
+        cells = [FactorLevel("duration", f"{d:g}", duration=d) for d in levels.duration]
+        cells += [
+            FactorLevel("body", body, body=body) for body in (draw.bodies if levels.body else ())
+        ]
+        cells += [
+            FactorLevel("height", f"{h:.2f}", point=draw.point(first, h)) for h in levels.height
+        ]
         for name in ("friction", "delay", "mass_error", "velocity_noise"):
-            cells += [Cell(name, f"{value:g}", conditions=Conditions(**{name: value}))
+            cells += [FactorLevel(name, f"{value:g}", conditions=Conditions(**{name: value}))
                       for value in getattr(levels, name)]  # fmt: skip
-        cells += [Cell("realism", r, conditions=Conditions(realism=r)) for r in levels.realism]
-        cells += [Cell("pushes", f"{n:g}", count=n) for n in levels.pushes]
+        cells += [
+            FactorLevel("realism", r, conditions=Conditions(realism=r)) for r in levels.realism
+        ]
+        cells += [FactorLevel("pushes", f"{n:g}", count=n) for n in levels.pushes]
         others = [cell for cell in cells if standard[cell.factor] != cell.level]
-        return [Cell(STANDARD, STANDARD), *others]
+        return [FactorLevel(STANDARD, STANDARD), *others]
 
 
 @dataclass(frozen=True)
-class Mix(Part):
+class Mix(SuitePart):
     """All factors sampled at once, durations evenly on a logarithmic scale."""
 
     trials: int = field(default=160, metadata={"min": 1, "max": MOST_TRIALS})

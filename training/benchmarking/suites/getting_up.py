@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from poise.envs.balance.start import FALLEN_POSTURES
 from poise.training.benchmarking.trials.trial import Trial
 
-from .draw import MOST_TRIALS, Draw, Part, start_seed
+from .draw import MOST_TRIALS, Draw, SuitePart, start_seed
 
 
 @dataclass(frozen=True)
-class GetUp(Part):
+class GetUp(SuitePart):
     """Postures on the ground (`fallen_posture`), one a trial; none is one of those of training."""
 
     trials: int = field(default=100, metadata={"min": 1, "max": MOST_TRIALS})

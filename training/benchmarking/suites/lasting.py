@@ -10,15 +10,15 @@ from poise.envs.physics.arms import find_arms
 from poise.envs.physics.pushes.sampler import PushSampler
 from poise.training.benchmarking.trials.trial import Trial
 
-from .draw import MOST_TRIALS, Draw, Part, generator
-from .random import Sequence, check_forces, sampled
+from .draw import MOST_TRIALS, Draw, SuitePart, generator
+from .random import PushSequence, check_forces, sampled
 from .walking import commanded
 
 PROFILE_NAMES = {"square": "step", "half-sine": "half-sine"}
 
 
 @dataclass(frozen=True)
-class Sustained(Part):
+class Sustained(SuitePart):
     """One push of seconds per trial: a step of force, or half a sine.
 
     Without `bodies` in `pushes`, the first two push bodies of the robot's description are pushed,
@@ -57,7 +57,7 @@ class Sustained(Part):
 
 
 @dataclass(frozen=True)
-class Gusts(Sequence):
+class Gusts(PushSequence):
     """A sequence of short pushes within `pushes.spread` of a random side of the trial.
 
     See `Sequence` for the units of pushes.

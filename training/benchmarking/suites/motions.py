@@ -12,7 +12,7 @@ from poise.envs.physics.pushes.sampler import LimitTable
 from poise.training.benchmarking.trials.trial import Trial
 
 from .directions import Envelope
-from .draw import MOST_TRIALS, Draw, Part, Recovered, generator, start_seed
+from .draw import MOST_TRIALS, Draw, Recovered, SuitePart, generator, start_seed
 
 STANDING = "standing"  # the motion, and the part, that J50 is first measured with
 PART = "motions"
@@ -27,7 +27,7 @@ def label(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Motions(Part):
+class MotionTrials(SuitePart):
     """Every motion × share of J50 × direction, `trials` times, at a random time of the motion.
 
     A name is that of a packaged clip, which is retargeted to the robot first, of a packaged motion,

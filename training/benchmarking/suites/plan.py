@@ -8,9 +8,9 @@ from typing import NamedTuple
 from poise.envs.sensing.drawn import check_limbs
 from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.push_limits import PushLimits
-from poise.training.benchmarking.trials.trial import Outcome, Trial, won
+from poise.training.benchmarking.trials.trial import Outcome, Trial, counts_as_won
 
-from .draw import Draw, Part
+from .draw import Draw, SuitePart
 from .factors import standard_levels
 from .scenarios import PART as SCENARIOS
 from .suite import Suite
@@ -23,14 +23,14 @@ class _Planned(NamedTuple):
     """A part at a level."""
 
     name: str  # that the suite has for it
-    part: Part
+    part: SuitePart
     level: str | None  # None: the suite's own
     first: list[Trial]  # of the first stage
     second: int  # number that seeds the second stage
     shift: int  # from the seeding numbers of its trials to their own
 
 
-class Plan:
+class TrialPlan:
     """Lists the trials of each controller; numbers leave room for the second stage of a part.
 
     Attributes:
@@ -114,7 +114,7 @@ class Plan:
         for key, part, level, first, number, shift in self._parts:
             recovered = {
                 name: [
-                    won(trial, finished[name, trial.number])
+                    counts_as_won(trial, finished[name, trial.number])
                     for trial in first
                     if self.plays(name, trial)
                 ]

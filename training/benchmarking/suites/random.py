@@ -11,11 +11,11 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import PushSampler, Range
 from poise.training.benchmarking.trials.trial import Trial
 
-from .draw import MOST_TRIALS, Draw, Part, check_rising, generator, start_seed
+from .draw import MOST_TRIALS, Draw, SuitePart, check_rising, generator, start_seed
 
 
 @dataclass(frozen=True)
-class Random(Part):
+class Random(SuitePart):
     """Random pushes, one per trial.
 
     Without `bodies` those of the robot's description are pushed. A magnitude in
@@ -42,7 +42,7 @@ class Random(Part):
 
 
 @dataclass(frozen=True)
-class Sequence(Part):
+class PushSequence(SuitePart):
     """Random pushes one after the other, `pushes.interval` apart, for `until` seconds.
 
     `pushes.count` of them at most. The impulse of all but the first is multiplied by a number
@@ -76,7 +76,7 @@ class Sequence(Part):
 
 
 @dataclass(frozen=True)
-class Quiet(Part):
+class Quiet(SuitePart):
     """No push at all."""
 
     trials: int = field(default=20, metadata={"min": 1, "max": MOST_TRIALS})

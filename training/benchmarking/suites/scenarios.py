@@ -12,7 +12,7 @@ from poise.envs.physics.pushes.sampler import PushSampler, Range
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.trial import Conditions, Trial
 
-from .draw import MOST_TRIALS, Draw, Part, check_rising, start_seed
+from .draw import MOST_TRIALS, Draw, SuitePart, check_rising, start_seed
 from .random import check_forces, one_after_the_other
 from .walking import from_start
 
@@ -44,7 +44,7 @@ class Scenario:
 
 
 @dataclass(frozen=True)
-class Scenarios(Part):
+class Scenarios(SuitePart):
     """Scenarios by name, in this order."""
 
     each: dict[str, Scenario] = field(default_factory=lambda: {"quiet": Scenario()})

@@ -12,14 +12,23 @@ from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
 
 from .directions import Envelope, Grid, Margin
-from .draw import Part, Standard
+from .draw import Standard, SuitePart
 from .factors import Factors, Mix
 from .getting_up import GetUp
 from .lasting import Gusts, Sustained
-from .motions import Motions
-from .random import Quiet, Random, Sequence
+from .motions import MotionTrials
+from .random import PushSequence, Quiet, Random
 from .scenarios import Scenarios
-from .walking import WALKING, Gait, Terrains, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
+from .walking import (
+    WALKING,
+    GaitTrials,
+    Terrains,
+    Velocity,
+    WalkKick,
+    WalkPush,
+    WalkRepeated,
+    WalkTrials,
+)
 
 
 @dataclass(frozen=True)
@@ -36,18 +45,18 @@ class Suite(Standard):
     factors: Factors | None = None
     mix: Mix | None = None
     random: Random | None = None
-    sequence: Sequence | None = None
+    sequence: PushSequence | None = None
     quiet: Quiet | None = None
     sustained: Sustained | None = field(default=None, metadata={"omit": "default"})
     gusts: Gusts | None = field(default=None, metadata={"omit": "default"})
-    walk: Walk | None = field(default=None, metadata={"omit": "default"})
-    gait: Gait | None = field(default=None, metadata={"omit": "default"})
+    walk: WalkTrials | None = field(default=None, metadata={"omit": "default"})
+    gait: GaitTrials | None = field(default=None, metadata={"omit": "default"})
     velocity: Velocity | None = field(default=None, metadata={"omit": "default"})
     walk_push: WalkPush | None = field(default=None, metadata={"omit": "default"})
     walk_kick: WalkKick | None = field(default=None, metadata={"omit": "default"})
     walk_repeated: WalkRepeated | None = field(default=None, metadata={"omit": "default"})
     terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
-    motions: Motions | None = field(default=None, metadata={"omit": "default"})
+    motions: MotionTrials | None = field(default=None, metadata={"omit": "default"})
     scenarios: Scenarios | None = field(default=None, metadata={"omit": "default"})
     get_up: GetUp | None = field(default=None, metadata={"omit": "default"})
     levels: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
@@ -69,7 +78,7 @@ class Suite(Standard):
                 raise ValueError(f"levels: {stem} comes twice, or is also the suite's own realism")
 
     @property
-    def parts(self) -> dict[str, Part]:
+    def parts(self) -> dict[str, SuitePart]:
         """The parts that it has, by name."""
         found = {name: getattr(self, name) for name in PARTS}
         return {name: part for name, part in found.items() if part is not None}

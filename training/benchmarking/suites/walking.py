@@ -20,8 +20,8 @@ from poise.envs.terrain.terrain import Terrain, seeded
 from poise.training.benchmarking.trials.trial import Trial
 
 from .directions import Envelope
-from .draw import MOST_TRIALS, Draw, Part, Recovered, generator, repeated
-from .random import Sequence as PushSequence
+from .draw import MOST_TRIALS, Draw, Recovered, SuitePart, generator, repeated
+from .random import PushSequence
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -44,7 +44,7 @@ def commanded(command: GaitCommand) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Walk(Part):
+class WalkTrials(SuitePart):
     """Every command, `trials` times, from differently disturbed starts and without a push."""
 
     commands: tuple[GaitCommand, ...] = (GaitCommand(0.5),)
@@ -60,14 +60,14 @@ class Walk(Part):
 
 
 @dataclass(frozen=True)
-class Gait(Walk):
+class GaitTrials(WalkTrials):
     """The same for commands with step parameters, which the steps are compared with."""
 
     commands: tuple[GaitCommand, ...] = (GaitCommand(0.5, step_length=0.2),)
 
 
 @dataclass(frozen=True)
-class Velocity(Part):
+class Velocity(SuitePart):
     """Courses of commands that change while it walks, `trials` times each."""
 
     courses: dict[str, tuple[TimedCommand, ...]] = field(
@@ -132,7 +132,7 @@ class WalkPush(Walking, Envelope):
 
 
 @dataclass(frozen=True)
-class WalkKick(Walking, Part):
+class WalkKick(Walking, SuitePart):
     """Kicks of the root while it walks: by each of `sizes` in a random direction, and in each axis
     of the ground up to ± one of `speeds`."""
 
@@ -180,7 +180,7 @@ WALKING = ("walk", "gait", "velocity", "walk_push", "walk_kick", "walk_repeated"
 
 
 @dataclass(frozen=True)
-class Terrains(Part):
+class Terrains(SuitePart):
     """Every terrain, `trials` times, from differently disturbed starts at one command.
 
     Each trial has a terrain of its own where heights are drawn: their seed is the trial's number.

@@ -43,6 +43,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.robot import Robot
+from poise.envs.sensing.realism import Realism
 
 from .names import NO_CONTROL, check_name
 
@@ -88,6 +89,11 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     config = controller_config(name)
     env = ResidualBalanceEnv(robot, controller=config, **overrides)
     return _idle(name, env, to_yaml(_wherever(config)) + _stand_in(config))
+
+
+def stand_in(agent: Agent, level: Realism) -> str | None:
+    """Return the controller that runs in place of an agent's at a realism level, or None."""
+    return agent.env.stand_in(level) if isinstance(agent.env, ResidualBalanceEnv) else None
 
 
 def code_of(name: str) -> list[str]:

@@ -9,7 +9,7 @@ from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.compiled.maths.runs import runs_of
 
-from .gait_record import WalkArrays, step_error, steps_of
+from .gait_record import WalkArrays, step_error, step_measures
 
 SWING_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
@@ -50,7 +50,7 @@ def touchdowns(record: WalkArrays) -> Touchdowns:
     return Touchdowns(rows[:, 0], rows[:, 1])
 
 
-class Walk:
+class RecordedWalk:
     """A recorded walk and its commands.
 
     Velocities are means over a stride, two steps from touchdown to touchdown, of the CoM along the
@@ -180,7 +180,9 @@ class Walk:
         rows, times = self.landed.row, self.record.time
         ends = np.flatnonzero(self.settled) + 2
         yaws = [self.mean_yaw(rows[k - 2], rows[k]) for k in ends]
-        measures = steps_of(self.record, rows[ends], self.landed.foot[ends], yaws, self.command_at)
+        measures = step_measures(
+            self.record, rows[ends], self.landed.foot[ends], yaws, self.command_at
+        )
         names = ("step_length", "step_width", "swing_time", "step_clearance")
         periods = times[rows[ends]] - times[rows[ends - 1]]
         return {

@@ -7,7 +7,6 @@ import numpy as np
 
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.episode import ENERGY, POSITIVE_WORK
 from poise.envs.physics.legs import find_legs
 
 
@@ -44,7 +43,7 @@ class WalkRecord:
             env.simulation.time, state.com[:2].copy(), state.heading_yaw,
             state.contacts > 0.5, state.sole_points[:, :2].copy(),
             state.sole_points[:, 2].copy(), float(state.angular_momentum[2]), np.array(knees),
-            float(metrics[ENERGY]), float(metrics[POSITIVE_WORK]),
+            float(metrics.energy), float(metrics.positive_work),
         ))  # fmt: skip
 
     def arrays(self) -> WalkArrays:
@@ -61,14 +60,14 @@ def knee_motors(env: BalanceEnv) -> list[int | None]:
     return [dofs.index(dof) if dof in dofs else None for dof in known]
 
 
-#: parameter of a command → its measure, see `steps_of`; the `duration` of a step is from touchdown
-#: to touchdown, without T_d
+#: parameter of a command → its measure, see `step_measures`; the `duration` of a step is from
+#: touchdown to touchdown, without T_d
 COMMANDED = {"step_time": "duration", "width": "apart", "clearance": "step_clearance",
              "step_length": "way"}  # fmt: skip
 Commanded = Callable[[float], GaitCommand]  # the command at a time [s]
 
 
-def steps_of(
+def step_measures(
     record: WalkArrays,
     rows: np.ndarray,
     feet: np.ndarray,

@@ -1,4 +1,4 @@
-"""Jobs for worker processes, run by `play`."""
+"""Jobs for worker processes, run by `run_job`."""
 
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -11,16 +11,18 @@ from poise.baselines.balance.references.tempo import Tempo
 from poise.envs.balance.config import StartNoise
 from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.motion.tracking.record import ANYWHERE
 
 from .agents import Agent, load_agent
 from .play import run_trial
-from .trial import Outcome, Trial, failed
+from .trial import Outcome, Trial, failed_trial
 from .variants import AgentVariants
+
+LONGEST = 600.0  # [s] of a trial that performs a motion
+ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an episode
 
 
 @dataclass(frozen=True)
-class Stage:
+class TrialStage:
     """The robot, duration and noise that all trials of a suite share."""
 
     robot: str | Path  #: name or path
@@ -59,12 +61,12 @@ class Stage:
 class Job:
     """One trial for one controller, by the name that `load_agent` takes."""
 
-    stage: Stage
+    stage: TrialStage
     controller: str
     trial: Trial
 
 
-def play(job: Job) -> Outcome:
+def run_job(job: Job) -> Outcome:
     """Run a job; an exception of the controller in the trial becomes the outcome's `error`.
 
     Raises PoiseError when the controller cannot be loaded here.
@@ -78,11 +80,11 @@ def play(job: Job) -> Outcome:
         raise
     except Exception as error:  # an external controller may raise anything
         del _variants[job.stage, job.controller]  # it may be broken: the next trial gets a new one
-        return failed(error)
+        return failed_trial(error)
 
 
 @cache
-def _motion(stage: Stage, name: str | None) -> ReferenceMotion | None:
+def _motion(stage: TrialStage, name: str | None) -> ReferenceMotion | None:
     return stage.motion(name)
 
 
@@ -91,10 +93,10 @@ def _robot(name: str | Path) -> Robot:
     return load_robot(name)
 
 
-_variants: dict[tuple[Stage, str], AgentVariants] = {}  # of this process
+_variants: dict[tuple[TrialStage, str], AgentVariants] = {}  # of this process
 
 
-def _loaded(stage: Stage, controller: str) -> AgentVariants:
+def _loaded(stage: TrialStage, controller: str) -> AgentVariants:
     key = (stage, controller)
     if key not in _variants:
         _variants[key] = AgentVariants(stage.load(controller))

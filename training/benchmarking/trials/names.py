@@ -9,6 +9,7 @@ from poise.baselines.policy_files.reading import advice, is_policy
 from poise.baselines.policy_files.refused import check_not_refused
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
+from poise.configs.problems import Problem
 from poise.configs.reading import is_file, is_folder
 from poise.configs.texts import check_shown
 from poise.envs.sensing.realism import level_names
@@ -51,13 +52,8 @@ def check_name(name: str) -> None:
     of_file = is_file(name) and Path(name).suffix in (".yaml", ".yml")
     if not (name in names or of_file or is_folder(name) or is_policy(name) or is_plugin(name)):
         check_not_refused(name)
-        raise ConfigError(
-            f"no such controller: {shown(name)}{meant(name, names) or ';'} give a name, a .yaml "
-            "file of a controller, a folder written by poise train, an ONNX file or a folder with "
-            "a deploy.yaml, or module:Class",
-            field="controller",
-            choices=names,
-        )
+        hint = meant(name, names) or ";"
+        raise Problem("unknown controller", None, "controller", names, value=shown(name), hint=hint)
     check_shown(name, field="controller")
 
 
@@ -65,9 +61,5 @@ def check_policy_name(name: str) -> None:
     """Raise ConfigError unless a policy of `poise train` may be called so; as `check_name`."""
     names = packaged("policies")
     if name not in names and not is_folder(name):
-        raise ConfigError(
-            f"no such policy: {shown(name)}{meant(name, names) or ';'} give a packaged one or a "
-            "folder written by poise train",
-            field="policy",
-            choices=names,
-        )
+        hint = meant(name, names) or ";"
+        raise Problem("unknown policy", None, "policy", names, value=shown(name), hint=hint)

@@ -5,22 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.envs.balance import episode
+from poise.baselines.extras import load_extra
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis, diagnose
 from poise.training.benchmarking.diagnosis.record import CourseRecord, swing_of
-from poise.training.motion.tracking.record import Tracking
 
 from .agents import Agent
-from .gait_figures import NO_ERROR, SWING_TIME, TrackingError, Walk, near
+from .gait_figures import NO_ERROR, SWING_TIME, RecordedWalk, TrackingError, near
 from .gait_record import WalkRecord
 from .rising import Rise, Rising
 from .signals import Sway
@@ -30,6 +29,26 @@ FOOT_DISPLACED = 0.05  # [m]
 TINY = 1e-9  # [s]
 SETTLED = 1.0  # [s] after which actions and drift count
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
+
+
+class TracksMotion(Protocol):
+    """The record of a performed motion, which `poise[motion]` makes.
+
+    Attributes:
+        fallen: whether the robot fell, for what the motion does at that time.
+        ended: whether the trial is over.
+    """
+
+    fallen: bool
+
+    @property
+    def ended(self) -> bool: ...
+
+    def update(self) -> None:
+        """Record a policy step."""
+
+    def figures(self) -> Any:
+        """Return the fields of `Outcome` that are of motions, as a dataclass."""
 
 
 class SteppedTrial:
@@ -47,9 +66,10 @@ class SteppedTrial:
         self._observation, _ = env.reset(seed=trial.seed, options=trial.options)
         if agent.begin is not None:
             agent.begin()
-        self.tracking: Tracking | None = None
+        self.tracking: TracksMotion | None = None
         if trial.motion is not None and isinstance(env, ResidualBalanceEnv):
-            self.tracking = Tracking(env, [push.start for push in trial.pushes])
+            tracking = load_extra("motions", "tracking", f"the motion {trial.motion!r}")
+            self.tracking = tracking(env, [push.start for push in trial.pushes])
 
     def step(self) -> np.ndarray:
         """Take a policy step; returns its action (na,). Raises what the controller raises."""
@@ -67,7 +87,7 @@ class SteppedTrial:
         """Continue for `duration` [s] with a fallen robot, at most until it is up again."""
         env, rising = self._agent.env, Rising(self._agent.env)
         for _ in range(round(duration / env.config.policy_period)):
-            if not env.episode.running[0] or rising.held:
+            if not env.episode.running or rising.held:
                 break
             self.step()
             rising.update()
@@ -80,7 +100,7 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     if trial.start is not None:
         return rise_trial(env, trial, stepped, watch)
     settled, course = Settled(), CourseRecord()
-    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    touchdowns = TouchdownCounter(len(env.robot.soles), env.config.policy_period)
     stands = not trial.commands and stepped.tracking is None
     sway = Sway() if trial.pushes and stands else None
     walk = WalkRecord() if trial.commands else None
@@ -95,7 +115,7 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
         each(env)
     outcome, loss = _outcome(env, trial, settled, touchdowns.count), "not quiet"
     if walk is not None:
-        outcome, loss = walked(env, trial, outcome, walk), "off command"
+        outcome, loss = walk_outcome(env, trial, outcome, walk), "off command"
         if left_command(trial, outcome) and outcome.own_speed_error is None:
             return against_unpushed(agent, trial, explained(env, trial, outcome, course, loss))
     elif stepped.tracking is not None:
@@ -106,7 +126,7 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     if outcome.recovered:
         return outcome
     outcome = explained(env, trial, outcome, course, loss)
-    if trial.get_up and env.fallen and env.episode.running[0]:
+    if trial.get_up and env.fallen and env.episode.running:
         return replace(outcome, **asdict(stepped.rise(trial.get_up)))
     return outcome
 
@@ -126,7 +146,7 @@ def rise_trial(
     """Return the outcome of a trial that starts on the ground: `recovered` is to be up at its
     end."""
     rising, settled = Rising(env), Settled()
-    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    touchdowns = TouchdownCounter(len(env.robot.soles), env.config.policy_period)
     while not stepped.done:
         if watch is not None:
             watch(env)
@@ -155,7 +175,7 @@ def first_start(trial: Trial) -> float | None:
     return min((each.start for each in events), default=None)
 
 
-def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
+def walk_outcome(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
     """Return the outcome of a trial with commands, with the figures of its walk.
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
@@ -163,7 +183,9 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     beyond its last edge; it then has no recovery time and no drift.
     """
     assert isinstance(env, CommandedEnv)  # it has taken the commands
-    walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
+    walk = RecordedWalk(
+        record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0
+    )
     figures: dict[str, Any] = {
         name: None if value is None else _finite(value) for name, value in walk.figures().items()
     }
@@ -219,14 +241,14 @@ def against_unpushed(agent: Agent, trial: Trial, outcome: Outcome) -> Outcome:
         stepped.step()
         record(env)
     fell = env.simulation.time if env.fallen else None
-    own = Walk(record.arrays(), trial.commands, fell).own_error()
+    own = RecordedWalk(record.arrays(), trial.commands, fell).own_error()
     outcome = replace(outcome, **_errors("own", own))
     if own is not None and near(last, own):
         outcome = replace(outcome, recovered=True, **asdict(Diagnosis()))
     return outcome
 
 
-def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
+def followed(env: BalanceEnv, outcome: Outcome, tracking: TracksMotion) -> Outcome:
     """Return the outcome of a trial that performs a motion: `recovered` is to have not fallen."""
     figures: dict[str, Any] = {
         name: _finite(value) for name, value in asdict(tracking.figures()).items()
@@ -247,32 +269,32 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         recovered=recovered,
         fallen=env.fallen,
         fall_time=env.simulation.time if env.fallen else None,
-        recovery_time=max(float(m[episode.LAST_MOVING]) - pushed, 0.0) if recovered else None,
-        foot_displaced=bool(m[episode.MAX_SLIDE] > FOOT_DISPLACED),
+        recovery_time=max(float(m.last_moving) - pushed, 0.0) if recovered else None,
+        foot_displaced=bool(m.max_slide > FOOT_DISPLACED),
         steps=touchdowns,
-        max_com=_finite(m[episode.MAX_COM]),
-        max_capture=_finite(m[episode.MAX_CAPTURE]),
-        min_cop_margin=_finite(m[episode.MIN_COP_MARGIN]),
-        max_slide=_finite(m[episode.MAX_SLIDE]),
-        energy=_finite(m[episode.ENERGY]),
-        peak_torque=_finite(m[episode.PEAK_TORQUE]),
-        saturation=float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
-        mean_power=_finite(m[episode.ENERGY] / max(m[episode.TORQUE_TIME], TINY)),
-        torque_variation=_finite(m[episode.TORQUE_VARIATION] / max(m[episode.TORQUE_TIME], TINY)),
-        solver_failures=int(m[episode.FAILURES]),
+        max_com=_finite(m.max_com),
+        max_capture=_finite(m.max_capture),
+        min_cop_margin=_finite(m.min_cop_margin),
+        max_slide=_finite(m.max_slide),
+        energy=_finite(m.energy),
+        peak_torque=_finite(m.peak_torque),
+        saturation=float(m.saturated / max(m.ticks, 1.0)),
+        mean_power=_finite(m.energy / max(m.torque_time, TINY)),
+        torque_variation=_finite(m.torque_variation / max(m.torque_time, TINY)),
+        solver_failures=int(m.failures),
         mean_abs_action=settled.actions / settled.steps if settled.steps else None,
         com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,
         foot_drift=_finite(settled.foot_drift) if settled.steps and not trial.pushes else None,
         final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
-        final_lean=_finite(lean(env)),
-        root_force=_finite(m[episode.ROOT_FORCE]),
-        edge_contacts=int(m[episode.EDGE_CONTACTS]),
+        final_lean=_finite(tilt_of(env)),
+        root_force=_finite(m.root_force),
+        edge_contacts=int(m.edge_contacts),
         surfaces_passed=surfaces_passed(env),
-        drawn=drawn_robot(env),
+        randomised=randomised_robot(env),
     )
 
 
-def drawn_robot(env: BalanceEnv) -> str | None:
+def randomised_robot(env: BalanceEnv) -> str | None:
     """Return the parameters of the episode's randomised robot as JSON; None without any."""
     return None if env.drawn is None else json.dumps(env.drawn.summary(env.arrays.timestep))
 
@@ -284,7 +306,7 @@ def surfaces_passed(env: BalanceEnv) -> int | None:
     return sum(bool(com[0] > each.x_min) for each in surfaces[1:]) if surfaces else None
 
 
-def lean(env: BalanceEnv) -> float:
+def tilt_of(env: BalanceEnv) -> float:
     """Return the tilt of the root from the standing posture [°], independent of yaw."""
     standing = env.simulation.arrays.root_standing[2]
     cosine = float(env.simulation.state.root_axes[2] @ standing)
@@ -323,7 +345,7 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-class Touchdowns:
+class TouchdownCounter:
     """Count touchdowns after a swing of at least `SWING_TIME`.
 
     Where the controller has a plan, only its planned steps count.

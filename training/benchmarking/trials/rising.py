@@ -31,9 +31,7 @@ def is_up(env: BalanceEnv) -> bool:
     0.8 of its standing height or higher, nothing but the feet on the ground."""
     s = env.simulation.state_arrays
     high = s.com[2] >= UP_HEIGHT * env.robot.height_com
-    return bool(
-        high and uprightness(env.simulation.arrays, s) > UP_TILT and s.other_contacts[0] < 0.5
-    )
+    return bool(high and uprightness(env.simulation.arrays, s) > UP_TILT and s.other_contacts < 0.5)
 
 
 class Rising:

@@ -8,7 +8,7 @@ from poise.envs.physics.simulation import Simulation
 from poise.training.benchmarking.statistics.eurobench import body_sway, recovery_time, sway_angle
 
 
-class Signals:
+class TrialSignals:
     """Record the signals of a trial in the heading frame; pass it to `run_trial`.
 
     After the trial, `t` is the time (n,) [s] and `columns` has

@@ -183,7 +183,7 @@ class TrialFigures:
     up_again: bool | None = None
     up_time: float | None = None  #: from the fall, or the start on the ground, until it was up
     #: parameters of a randomised robot as JSON, see `DrawnRobot.summary`
-    drawn: str | None = None
+    randomised: str | None = None
     #: exception of the controller on one line; the trial then counts as not recovered
     error: str | None = None
 
@@ -201,12 +201,21 @@ class Outcome(Diagnosis, TrialFigures):
     """
 
 
-def won(trial: Trial, outcome: Outcome) -> bool:
+#: older name → name of fields of `Outcome`, which are columns of trials.csv (`respelled`)
+FORMER = {
+    "full_motor": "saturated_motor",
+    "full_from": "saturated_from",
+    "full_time": "saturated_time",
+    "drawn": "randomised",
+}
+
+
+def counts_as_won(trial: Trial, outcome: Outcome) -> bool:
     """Return whether a trial counts as won in J50, rankings and pairs: a walk on level ground
     without a fall, any other trial recovered."""
     return outcome.upright if trial.judged_by_falls else outcome.recovered
 
 
-def failed(error: Exception) -> Outcome:
+def failed_trial(error: Exception) -> Outcome:
     """Return the outcome of a trial in which the controller raised."""
     return Outcome(recovered=False, fallen=False, error=raised(error), loss="error")

@@ -34,7 +34,7 @@ def check(
     Args:
         motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
         qp: also solve the momentum QP at every sample of the motion.
-        controller: a momentum QP whose gains are used.
+        controller: momentum QP that supplies the gains.
         fit: change a .npz until the robot can perform it: slower, or with its centre of mass moved.
         out: the .npz file for the fitted motion.
 
@@ -105,23 +105,24 @@ def follow(
             motion is made first: a .motion or .csv file, the name of a packaged one, or its text.
             For a tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1, or
             "network" for the one within its network.
-        controller: as in poise evaluate; a policy from outside that tracks motions follows clips.
-        starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
-            at each tempo of --fastest.
+        controller: a controller as poise evaluate takes it; a policy from outside that tracks
+            motions follows clips.
+        starts: number of trials, each from a differently disturbed start; by default 20, or 5 at
+            each tempo of --fastest.
         push: impulse of a push at a random time of the motion [N s]; 0 for none.
         share: the same as a share of the J50 of the push's direction, standing (configs/limits).
-        directions: of the pushes, spread evenly, one after the other.
+        directions: number of directions of the pushes, spread evenly.
         tempo: speed factor of the motion.
         realism: realism level: ideal, lab, field, or a .yaml file.
         physics: the engine that steps the robot: mujoco, drake, or a .yaml file of its settings.
         waits: let the motion wait while the robot recovers.
         fastest: find the largest tempo at which none of the trials falls.
-        seed: of starts and pushes.
+        seed: seed of starts and pushes.
         out: a JSON file to write the trials to.
         report: a .html file for pictures of the trial with the largest error: ZMP and centre of
             pressure, errors, tempo, and the timeline of a script's motion.
         video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost.
-        size: of the video, width and height [pixels], even.
+        size: width and height of the video [pixels], even.
 
     Returns:
         0 if no trial fell, 1 if one did.
@@ -141,7 +142,7 @@ def follow(
     from poise.training.motion.following.tracked import follow_clip, following, tracker_config
     from poise.training.pictures.figures.encoder import check_video
     from poise.training.pictures.figures.playback import check_size
-    from poise.training.pictures.motion_report.film import Film
+    from poise.training.pictures.motion_report.film import MotionFilm
     from poise.training.pictures.motion_report.page import check_page
     from poise.training.pictures.motion_report.performance import Watched, write_performance
 
@@ -195,7 +196,7 @@ def follow(
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return 0
         watched = Watched() if report is not None else None
-        film = None if video is None else stack.enter_context(Film(video, size, watched))
+        film = None if video is None else stack.enter_context(MotionFilm(video, size, watched))
         waits_so = Tempo(waits=True) if waits else None
         trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
                          impulse=push, share=share, directions=directions, seed=seed, speed=tempo,

@@ -14,6 +14,7 @@ from poise.baselines.motion.clips.roles import ROLES
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
+from poise.configs.problems import Problem, out_of_range
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.options.arguments import OnRobot, Switch
 from poise.training.running.options.pages import print_commands
@@ -32,14 +33,24 @@ Solver = Literal["frame", "spacetime", "grid"]
 Unit = Annotated[
     str,
     tyro.conf.arg(
-        help="of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs)."
+        help="unit of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).",
+        metavar="UNIT",
     ),
 ]
-Up = Annotated[str, tyro.conf.arg(help="the file's axis that is up, such as y or -z, or auto.")]
-Forward = Annotated[str, tyro.conf.arg(help="the axis along which the rest pose faces, or auto.")]
+Up = Annotated[
+    str,
+    tyro.conf.arg(help="axis of the file that is up, such as y or -z, or auto.", metavar="AXIS"),
+]
+Forward = Annotated[
+    str,
+    tyro.conf.arg(help="axis along which the rest pose faces, or auto.", metavar="AXIS"),
+]
 Joints = Annotated[
     tuple[str, ...],
-    tyro.conf.arg(help="role=JOINT, such as hip_left=Thigh_L, for each role that is not found."),
+    tyro.conf.arg(
+        help="joints of roles that are not found, such as hip_left=Thigh_L.",
+        metavar="ROLE=JOINT …",
+    ),
 ]
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
@@ -92,14 +103,14 @@ def convert(
         file: a .bvh file, the name of a packaged clip, or a robot's .npz.
         out: the .bvh file to write.
         cut: two times [s]; what lies between is kept.
-        speed: how many times as fast.
+        speed: factor of the speed.
         mirror: exchange left and right.
-        reverse: play it backwards.
-        turn: about the vertical axis [degrees].
-        close: seconds over which the end is blended into the first frame.
-        loop: how many times, one after the other.
-        rate: frames a second.
-        robot: whose .npz it is.
+        reverse: reverse the time.
+        turn: angle to turn about the vertical axis [degrees].
+        close: time over which the end is blended into the first frame [s]; 0 for none.
+        loop: number of repetitions.
+        rate: frames a second; those of the file if not given.
+        robot: robot of the .npz: a packaged one or a .yaml description.
     """
     clip = _clip(file, unit, up, forward, robot, joints)
     if cut is not None:
@@ -112,7 +123,7 @@ def convert(
     clip = clip.turned(turn * 3.141592653589793 / 180.0) if turn else clip
     if rate is not None:
         if not 1.0 <= rate <= 1000.0:
-            raise ConfigError(f"must be from 1 to 1000, not {rate:g}", field="rate")
+            raise out_of_range(rate, field="rate", least=1, most=1000, form="g")
         clip = clip.resampled(1.0 / rate)
     write_bvh(clip, out)
     print(out)
@@ -144,23 +155,22 @@ def bring(
 
     The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
     motion with steps, which motion-step performs. What cannot be performed becomes a motion that
-    can be seen, by poise motion play and poise view, and the reason is said. Needs pip install -e
-    '.[motion]' in a checkout.
+    can be seen, by poise motion play and poise view, and the reason is printed.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.
         out: the .npz file to write.
         cut: two times [s]; what lies between is kept.
-        speed: how many times as fast.
+        speed: factor of the speed.
         mirror: exchange left and right.
-        smooth: low-pass on what is asked of the robot [Hz].
-        lead: from standing into the clip, and back [s].
-        planted: take the feet as planted though they move in the clip.
-        solver: frame by frame, spacetime for the optimum of the whole clip, grid for constraints
-            by trial in steps; without one spacetime if there are constraints, else frame.
-        constraints: a packaged name (see poise list) or a .yaml file of what else is wanted.
-        steps: keep the clip's own steps, for motion-step, though legs make them short.
-        kinematic: do what the clip does, whether or not it can be performed.
+        smooth: cut-off of the low-pass on the targets [Hz].
+        lead: time from standing into the clip, and back [s].
+        planted: keep the feet planted even where they move in the clip.
+        solver: frame by frame, spacetime for the optimum of the whole clip, grid for a stepwise
+            search; by default spacetime if there are constraints, else frame.
+        constraints: further constraints: a packaged name (see poise list) or a .yaml file.
+        steps: keep the steps of the clip, for motion-step, even where legs make them short.
+        kinematic: follow the clip even where it cannot be performed.
         video: a .mp4 or .webp file of the robot, and beside it the skeleton of the file.
     """
     from poise.baselines.balance.references.robot_clip import write_robot_clip
@@ -213,11 +223,11 @@ def play(
     Args:
         file: a .bvh file, the name of a packaged clip, or a robot's .npz, which has no skeleton.
         video: the .mp4 or .webp file to write.
-        robot: who does it.
-        size: width and height [pixels], even.
-        planted: take the feet as planted though they move in the clip.
+        robot: robot to show: a packaged one or a .yaml description.
+        size: width and height of the video [pixels], even.
+        planted: keep the feet planted even where they move in the clip.
     """
-    from poise.baselines.balance.references.robot_clip import check_robot, read_robot_clip
+    from poise.baselines.balance.references.robot_clip import check_clip_robot, read_robot_clip
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.training.pictures.figures.encoder import check_video
     from poise.training.pictures.figures.playback import check_size, write_playback
@@ -228,7 +238,7 @@ def play(
     body = load_robot(robot)
     if file.suffix == ".npz":
         clip = read_robot_clip(file)
-        check_robot(clip, body, str(file))
+        check_clip_robot(clip, body, str(file))
         print(f"{write_playback(video, body, clip.qpos, clip.dt, None, size)} frames")
         print(video)
         return
@@ -269,15 +279,15 @@ MOTION: dict[str, Callable[..., object]] = {
 }
 
 
-def run(args: Sequence[str]) -> int:
+def run_motion(args: Sequence[str]) -> int:
     """Run a sub-command of `poise motion`; returns 0, or 1 (see `check`)."""
     if not args or args[0] in ("-h", "--help", "--help-all"):
         print_commands(USAGE, MOTION, terminal())
         return 0
     name = args[0]
     if name not in MOTION:
-        raise ConfigError(f"no such command: motion {shown(name)}{meant(name, MOTION)}",
-                          choices=MOTION)  # fmt: skip
+        hint, value = meant(name, MOTION), f"motion {shown(name)}"
+        raise Problem("unknown command", None, None, MOTION, value=value, hint=hint)
     return answered(MOTION[name], args[1:], f"poise motion {name}")
 
 

@@ -38,14 +38,14 @@ def join(
 
     Args:
         first: a .bvh file, or the name of a packaged clip; for physical a robot's .npz.
-        second: the same, of the same skeleton or robot.
+        second: another file of the same skeleton or robot.
         out: the .bvh file to write; for physical a .npz.
-        kind: of the transition; physical lasts as long and bends as much as the robot needs.
-        duration: of the transition [s]; of inertial the half-life. None: where the coefficient is
-            least.
-        leave: time at which physical leaves the first [s]; None for its end.
+        kind: kind of the transition; physical lasts as long and bends as much as the robot needs.
+        duration: duration of the transition [s], of inertial the half-life; by default the one
+            with the smallest coefficient.
+        leave: time at which physical leaves the first [s]; by default its end.
         enter: time at which physical enters the second [s].
-        robot: whose .npz they are.
+        robot: robot of the .npz files: a packaged one or a .yaml description.
     """
     if kind == "physical":
         if duration is not None:
@@ -78,21 +78,22 @@ def match(
     """Make a motion that follows velocity commands, by motion matching (docs/motion-synthesis.md).
 
     Args:
-        files: .bvh files or names of packaged clips, all of one skeleton. None: the packaged ones,
-            with a walk of 0.3 to 1.2 m/s.
+        files: .bvh files or names of packaged clips, all of one skeleton; by default the packaged
+            ones, with a walk of 0.3 to 1.2 m/s.
         commands: commands from a time on, as SECONDS:FORWARD,LEFT,TURN in m/s and rad/s.
         out: the .bvh file to write.
-        seconds: how long the motion lasts.
-        start: CLIP@SECONDS where it begins. None: the first frame of the first clip.
+        seconds: duration of the motion [s].
+        start: where the motion begins, as CLIP@SECONDS; by default the first frame of the first
+            clip.
     """
-    from poise.training.motion.following.matched import matched, parse_commands, print_matched
+    from poise.training.motion.following.matched import matched, parse_timed_commands, print_matched
 
     if out.suffix != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=out, choices=("*.bvh",))
     check_out_file(out)
     made, database = matched(files, commands, seconds, start)
     write_bvh(made.clip, out)
-    print_matched(made, database, parse_commands(commands), terminal())
+    print_matched(made, database, parse_timed_commands(commands), terminal())
     print(out)
 
 

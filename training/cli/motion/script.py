@@ -49,10 +49,10 @@ def graph(
         files: .bvh files or names of packaged clips, all of one skeleton; with a robot a .npz, or
             a motion with steps by its name or .yaml, too.
         out: the .yaml file to write.
-        robot: whose motions the clips become.
+        robot: robot that the clips are retargeted to; by default they keep their skeleton.
         coefficient: largest K of a transition.
         angle: largest turn of a joint in it [degrees].
-        any_feet: do not ask that the same feet be planted before and after it.
+        any_feet: allow transitions between different planted feet.
         least: shortest transition [s].
         most: longest transition [s].
         time_price: price of a second of transition, or of what no script asks for, in units of K.
@@ -100,12 +100,12 @@ def plan(
 
     Args:
         script: a .motion file, a .csv of --table, the name of a packaged script, or its text.
-        graph: a file of poise motion graph. None: the packaged clips.
-        robot: for whom the packaged clips are retargeted. None: their own skeleton.
-        k: how many ways.
-        table: print the script as a table, comma-separated, too.
-        kind: of transitions that the script leaves open. None: physical with a robot, which
-            lasts as long and bends as much as it needs, and insert without.
+        graph: a file of poise motion graph; by default the packaged clips.
+        robot: robot that the packaged clips are retargeted to; by default they keep their skeleton.
+        k: number of alternatives.
+        table: also print the script as a comma-separated table.
+        kind: kind of transitions that the script leaves open; by default physical with a robot,
+            which lasts as long and bends as much as it needs, and insert without.
     """
     from poise.training.motion.following.script_tables import print_plan
 
@@ -134,12 +134,12 @@ def synth(
     Args:
         script: a .motion file, a .csv of --table, the name of a packaged script, or its text.
         out: the file to write: .npz for a robot to follow, or .bvh.
-        robot: whose motion it becomes. None: that of the clips' own skeleton, as .bvh.
-        graph: a file of poise motion graph. None: the packaged clips.
+        robot: robot that the motion is for; by default the skeleton of the clips, as .bvh.
+        graph: a file of poise motion graph; by default the packaged clips.
         start: a posture from which the motion begins, as <NAME> in a script.
         goal: a posture in which it ends.
-        kind: of transitions that the script leaves open. None: physical with a robot, which
-            lasts as long and bends as much as it needs, and insert without.
+        kind: kind of transitions that the script leaves open; by default physical with a robot,
+            which lasts as long and bends as much as it needs, and insert without.
         least: shortest transition of the packaged clips [s]; a graph has its own.
         report: a .html file for the script's timeline and, for a robot, the ZMP of the motion.
     """

@@ -13,7 +13,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.observation import observation_table
 from poise.training.learning.policy import Policy
 
-from .figures import Figure
+from .figures import ExportFigure
 from .metadata import IDS, actions, units
 
 TAGS = ("deep-reinforcement-learning", "reinforcement-learning", "stable-baselines3", "humanoid",
@@ -25,7 +25,7 @@ def card(
     archive: str,
     policy: Policy,
     env: BalanceEnv,
-    figures: Sequence[Figure],
+    figures: Sequence[ExportFigure],
     licence: str | None,
     notice: str,
 ) -> str:

@@ -39,10 +39,12 @@ def check_onnx(path: Path, policy: Policy, count: int = COUNT) -> float:
     """
     seen = observations(policy, count)
     (actions,) = onnx_session(path).run([OUTPUT], {INPUT: seen})
-    return compared(actions, policy.predict(seen)[0], TOLERANCE, path.name)
+    return largest_difference(actions, policy.predict(seen)[0], TOLERANCE, path.name)
 
 
-def compared(actions: np.ndarray, expected: np.ndarray, tolerance: float, name: str) -> float:
+def largest_difference(
+    actions: np.ndarray, expected: np.ndarray, tolerance: float, name: str
+) -> float:
     """The largest difference; raises PoiseError where it is more than `tolerance`, or no number."""
     worst = float(np.abs(actions.astype(float) - expected.astype(float)).max())
     if not worst <= tolerance:  # NaN too

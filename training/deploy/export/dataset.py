@@ -14,7 +14,7 @@ from poise.configs.extras import needing
 from poise.configs.files import new_folder
 from poise.envs.balance.plain_info import push_arrays
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.benchmarking.trials.push_limits import load_limits
@@ -68,7 +68,7 @@ def write_dataset(
     with allowing([*named(controller), *([allow] if isinstance(allow, str) else allow)]):
         given: dict[str, Any] = {"duration": chosen.duration, "pushes": None, "noise": chosen.noise}
         agent = load_agent(controller, known, **given)
-        plan = Plan(chosen, load_limits(known), seed, [controller])
+        plan = TrialPlan(chosen, load_limits(known), seed, [controller])
         episodes = [_episode(agent, trial, EpisodeBuffer) for trial in plan.first]
     won = sum(bool(each.infos["is_success"][-1]) for each in episodes)
     with (

@@ -15,7 +15,7 @@ from poise.training.running.files import SUMMARY
 
 
 @dataclass(frozen=True)
-class Figure:
+class ExportFigure:
     """A number of a result.
 
     Attributes:
@@ -33,7 +33,9 @@ class Figure:
     source: str
 
 
-def figures(policy: Policy, name: str, robot: Robot, result: str | Path | None) -> list[Figure]:
+def figures(
+    policy: Policy, name: str, robot: Robot, result: str | Path | None
+) -> list[ExportFigure]:
     """Return the figures of the run's own evaluation of this policy, then those of `result`.
 
     `result` is a folder of `poise evaluate` or `poise benchmark`, or its summary.json.
@@ -47,7 +49,7 @@ def figures(policy: Policy, name: str, robot: Robot, result: str | Path | None) 
     return found
 
 
-def _of_training(policy: Policy) -> list[Figure]:
+def _of_training(policy: Policy) -> list[ExportFigure]:
     """Return this checkpoint's rates of recovered and fallen held-out pushes, if evaluated."""
     rows = policy.state.get("evaluations")
     row = next((r for r in rows if _met(r, policy)), None) if isinstance(rows, list) else None
@@ -55,7 +57,7 @@ def _of_training(policy: Policy) -> list[Figure]:
         return []
     source = f"{policy.config.evaluation.trials} held-out pushes during training"
     return [
-        Figure(key, f"{key}, {source}", row[key], f"{row[key]:.1%}", source)
+        ExportFigure(key, f"{key}, {source}", row[key], f"{row[key]:.1%}", source)
         for key in ("recovered", "fallen")
         if isinstance(row.get(key), float) and 0.0 <= row[key] <= 1.0
     ]
@@ -65,7 +67,7 @@ def _met(row: object, policy: Policy) -> bool:
     return isinstance(row, Mapping) and row.get("timesteps") == policy.state["timesteps"]
 
 
-def _of_result(fingerprint: str, path: Path) -> list[Figure]:
+def _of_result(fingerprint: str, path: Path) -> list[ExportFigure]:
     path = path / SUMMARY if is_folder(path) else path
     summary = read_summary(path)
     entries = summary["controllers"].values()
@@ -77,13 +79,13 @@ def _of_result(fingerprint: str, path: Path) -> list[Figure]:
     source = f"suite {summary['suite']}, seed {summary['seed']}, robot {summary['robot']['name']}"
     low, high = entry["recovered_ci95"]
     rate = f"{entry['recovered_rate']:.1%} of {entry['trials']}"
-    found = [Figure("recovered_rate", f"recovered, {source}", entry["recovered_rate"],
+    found = [ExportFigure("recovered_rate", f"recovered, {source}", entry["recovered_rate"],
                     f"{rate}, 95 % {_interval(low, high, '.1%')}", source)]  # fmt: skip
     if "j50_mean" in entry and "j50_mean_ci95" in entry:
         low, high = entry["j50_mean_ci95"]
         text = f"{entry['j50_mean']:.1f} N·s, 95 % {_interval(low, high, '.1f')}"
         name = f"{J50_MEAN.heading}, {source}"
-        found.append(Figure("j50_mean", name, entry["j50_mean"], text, source))
+        found.append(ExportFigure("j50_mean", name, entry["j50_mean"], text, source))
     return found
 
 

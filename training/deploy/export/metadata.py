@@ -12,7 +12,9 @@ import numpy as np
 
 import poise
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.velocity import VelocityEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
+from poise.baselines.walking.calibration import Calibration
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.observation import Scales, Term
 from poise.envs.balance.position import PositionBalanceEnv
@@ -76,6 +78,8 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
     action of 1 adds, in the unit of `action_units`. `joint_names` are the motors' joints,
     `default_joint_pos` [rad] is where they stand. A policy with servos has `joint_stiffness`
     [N·m/rad], `joint_damping` [N·m·s/rad], and `joint_hold` [rad], the target at an action of 0.
+    `command_calibration` (JSON) are the knots of a `Calibration`, through which a command goes
+    before it is observed.
     """
     robot, config, made = env.robot, policy.config, actions(env)
     dofs = np.asarray(robot.motor_dofs)
@@ -112,6 +116,8 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
             "joint_damping": _list(servos.damping),
             "joint_hold": _list(servos.hold),
         }
+    if isinstance(env, VelocityEnv) and env.calibration != Calibration():
+        said["command_calibration"] = json.dumps(asdict(env.calibration))
     return said
 
 

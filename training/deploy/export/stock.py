@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.mirror import Mirror
-from poise.training.learning.checkpoints import LEFT_OUT, plain
+from poise.training.learning.checkpoints import LEFT_OUT, plain_model
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.policy import Policy
 from poise.training.learning.policy_files import (
@@ -23,7 +23,7 @@ from poise.training.learning.policy_files import (
 from poise.training.learning.train import make_model
 from poise.training.learning.vec_env import ThreadedVecEnv
 
-from .check import compared, observations
+from .check import largest_difference, observations
 
 Weights = dict[str, np.ndarray]  # by their names in SB3's state_dict
 
@@ -60,12 +60,12 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
         model = make_model(config, normalize)
         model.policy.load_state_dict({k: torch.as_tensor(v) for k, v in weights.items()})
         model.num_timesteps = int(policy.state["timesteps"])
-        plain(model).save(folder / archive, exclude=LEFT_OUT)
+        plain_model(model).save(folder / archive, exclude=LEFT_OUT)
     normalize.save(str(folder / NORMALISATION))
     shown = observations(policy, CHECKED)
     model.policy.load_state_dict(read_weights(folder / archive))  # as they were written
     actions, _ = model.predict(normalize.normalize_obs(shown), deterministic=True)
-    compared(actions, policy.predict(shown)[0], TOLERANCE, archive)
+    largest_difference(actions, policy.predict(shown)[0], TOLERANCE, archive)
 
 
 def _seen(name: str, values: np.ndarray, seen: int) -> np.ndarray:

@@ -26,7 +26,7 @@ from .proposals import (
     try_clocks,
     try_histories,
 )
-from .rollout import Finding, compare
+from .rollout import Finding, compare_rollout
 from .standing import Stood, stand
 
 
@@ -93,7 +93,7 @@ def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> Policy
     if proposed is not None:
         config = proposed.config
     policy = PolicyFile(robot, config)
-    findings = () if rollout is None else compare(policy, rollout)
+    findings = () if rollout is None else compare_rollout(policy, rollout)
     stood = stand(robot, config)
     if steps == 1:
         if stood.fell is not None and order_is_open(config):

@@ -9,7 +9,7 @@ import numpy as np
 from poise.baselines.policy_files.controller import PolicyFile, observer_of
 from poise.baselines.policy_files.motion.track import MOTION_TERMS
 from poise.baselines.policy_files.networks import OnnxNetwork
-from poise.baselines.policy_files.terms import CLOCKS, COMMANDS, Place, Seen, meaning
+from poise.baselines.policy_files.terms import CLOCKS, COMMANDS, Seen, TermPlace, meaning
 from poise.configs.archives import read_archive, read_arrays
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
@@ -22,7 +22,7 @@ COMMANDED = (*COMMANDS, *CLOCKS, *MOTION_TERMS)
 
 
 @dataclass(frozen=True)
-class Rollout:
+class RecordedRollout:
     """T steps of a policy, recorded by its authors.
 
     Attributes:
@@ -50,7 +50,7 @@ class Finding:
 
 def read_rollout(
     path: Path, inputs: Sequence[str] = ("",), memories: Sequence[str] = ()
-) -> Rollout:
+) -> RecordedRollout:
     """Return the arrays of an .npz file: `observations` and `actions`, and what else it has.
 
     `qpos` and `qvel` are the states. Of a network that remembers the file may hold each memory
@@ -71,12 +71,12 @@ def read_rollout(
         shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
         raise ConfigError(f"needs (T, n) observations and (T, na) actions, not {shapes}",
                           source=path)  # fmt: skip
-    return Rollout({each: flat[name] for each, name in names.items()}, flat["actions"],
+    return RecordedRollout({each: flat[name] for each, name in names.items()}, flat["actions"],
                    **{name: flat[name] for name in states},
                    memories={name: arrays[name] for name in known})  # fmt: skip
 
 
-def compare(policy: PolicyFile, source: Path) -> list[Finding]:
+def compare_rollout(policy: PolicyFile, source: Path) -> list[Finding]:
     """Return the findings of a rollout file about a policy's network and its observation.
 
     Raises ConfigError as `read_rollout`, and for observations or actions of another size.
@@ -93,7 +93,7 @@ def compare(policy: PolicyFile, source: Path) -> list[Finding]:
     return [*_network(policy, rollout), *_terms(policy, rollout)]
 
 
-def _network(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
+def _network(policy: PolicyFile, rollout: RecordedRollout) -> Iterator[Finding]:
     """Yield whether the network answers as it did, and remembers what it did."""
     network, worst = policy.network, 0.0
     apart = dict.fromkeys(rollout.memories, 0.0)
@@ -120,7 +120,7 @@ def _network(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
         yield Finding(f"memory {name}", off <= SAME, f"differs by {off:.1g} at most")
 
 
-def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
+def _terms(policy: PolicyFile, rollout: RecordedRollout) -> Iterator[Finding]:
     """Yield each term of the observation, at the first place of each age."""
     for name, places in policy.observer.places().items():
         for place in places:
@@ -132,7 +132,7 @@ def _terms(policy: PolicyFile, rollout: Rollout) -> Iterator[Finding]:
 
 
 def _judged(
-    place: Place, name: str, policy: PolicyFile, rollout: Rollout
+    place: TermPlace, name: str, policy: PolicyFile, rollout: RecordedRollout
 ) -> tuple[bool | None, str]:
     """Return whether a term of an input is right, and what was found of it."""
     observed = rollout.observations[name][place.age + 1 :]
@@ -149,7 +149,7 @@ def _judged(
     return None, "undecided without states (qpos, qvel)"
 
 
-def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray | None:
+def _expected(place: TermPlace, policy: PolicyFile, rollout: RecordedRollout) -> np.ndarray | None:
     """What a term showed from the step `age` + 1 on; None where that is not known."""
     states = rollout.qpos is not None and rollout.qvel is not None
     name = meaning(place.term)

@@ -54,7 +54,7 @@ def print_policies(known: list[Known], console: Console) -> None:
                       markup=False, highlight=False)  # fmt: skip
 
 
-def print_check(check: PolicyCheck, console: Console) -> None:
+def print_policy_check(check: PolicyCheck, console: Console) -> None:
     """What is known, what is missing, how it stood, what the rollout tells, and the verdict."""
 
     def say(line: str) -> None:

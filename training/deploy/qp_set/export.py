@@ -18,8 +18,9 @@ from poise.baselines.solvers import QP
 from poise.baselines.whole_body import formulation
 from poise.baselines.whole_body.constraint_rows import torque_matrix
 from poise.baselines.whole_body.momentum_qp import MomentumQP
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import PoiseError
 from poise.configs.files import check_new_folder, new_folder
+from poise.configs.problems import out_of_range
 from poise.configs.schema import to_dict
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
@@ -40,10 +41,14 @@ def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, n
         qp, T, offset = tick.reduced, tick.torque_matrix, tick.torque_offset
     else:
         state = tick.state
-        tasks = [task.rows(state) for task in controller.tasks.values()]
         points = [contact.rows(state) for contact in controller.contacts.values()]
         qp = formulation.build(
-            state, tick.targets, controller.parameters, tick.cop_vel, tasks, points=points
+            state,
+            tick.targets,
+            controller.parameters,
+            controller.tasks.values(),
+            tick.cop_vel,
+            points=points,
         )
         joints = controller.arrays.motor_dofs - 6
         T = np.zeros((len(joints), len(qp.g)))
@@ -101,9 +106,9 @@ def write_qp_set(
     """
     out = Path(out)
     if count < 1:
-        raise ConfigError(f"must be at least 1, not {count}", field="count")
+        raise out_of_range(count, field="count", least=1)
     if seed < 0:
-        raise ConfigError(f"must be at least 0, not {seed}", field="seed")
+        raise out_of_range(seed, field="seed", least=0)
     check_new_folder(out)
     body = load_robot(robot)
     limits = load_limits(body)

@@ -43,7 +43,7 @@ class RecordedTick(NamedTuple):
     active: int  # rows that bind
 
 
-class Recorder(MomentumQP):
+class QPRecorder(MomentumQP):
     """The momentum QP, keeping its ticks between two times, but for those without a solution."""
 
     begin, end = PUSH_START, PUSH_START + SPAN
@@ -87,7 +87,7 @@ class Recovery:
 
 def recoveries(robot: Robot, controller: str, limits: PushLimits, seed: int) -> Iterator[Recovery]:
     """Yield trials without end: each of 8 directions with each of 5 impulses, then repeated."""
-    recorder = Recorder(robot, momentum_qp_config(controller))
+    recorder = QPRecorder(robot, momentum_qp_config(controller))
     env = ResidualBalanceEnv(robot, controller=recorder, pushes=None, duration=TRIAL_DURATION)
     action = np.zeros(len(env.action_names))
     body, number = push_bodies(robot)[0], 0

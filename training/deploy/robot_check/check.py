@@ -16,6 +16,7 @@ from .faults import Fault, find_faults
 from .standing.holding import Holding, holding
 from .standing.one_leg import one_leg_qpos
 from .standing.posture import PostureFigures, posture_figures
+from .standing.pushed import Pushed, push_gently
 from .standing.rest import Rest, stand_at_rest
 from .standing.stability import DirectionFigures, by_direction
 from .touching import SelfContact, self_contacts, sole_contacts
@@ -53,7 +54,7 @@ class RobotCheck:
         self_contacts: bodies that are inside each other while it stands.
         directions: margins, and pushes that a pendulum stops.
         dynamics: light joints, friction, flags.
-        rest: two seconds at rest with momentum-qp.
+        rest: two seconds at rest with momentum-qp; pushed: half of the ankle limit with it.
         notes: what was changed in the model so that it can be simulated.
         controllers: "in place" and "stepping" → which packaged ones take the robot.
     """
@@ -76,6 +77,7 @@ class RobotCheck:
     directions: tuple[DirectionFigures, ...]
     dynamics: Dynamics
     rest: Rest
+    pushed: Pushed
     notes: tuple[str, ...]
     controllers: dict[str, Uses]
 
@@ -130,7 +132,8 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
         self_contacts=self_contacts(robot),
         directions=by_direction(PushLimits(robot)),
         dynamics=dynamics(robot),
-        rest=stand_at_rest(robot),
+        rest=(rest := stand_at_rest(robot)),
+        pushed=Pushed() if rest.fallen or rest.refused else push_gently(robot),
         notes=robot.notes,
         controllers=controllers_for(robot),
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .dynamics import LIGHT, Dynamics, JointDynamics
+from .standing.pushed import SHARE, Pushed
 from .standing.rest import CONTROLLER, DURATION
 from .uses import STEPPING
 
@@ -56,6 +57,7 @@ def find_faults(check: RobotCheck) -> Iterator[Fault]:
     yield from _one_foot(check)
     yield from _slow_legs(check)
     yield from _unrest(check)
+    yield from _pushed(check.pushed)
 
 
 def _first(texts: Sequence[str], most: int) -> str:
@@ -241,3 +243,14 @@ def _unrest(check: RobotCheck) -> Iterator[Fault]:
     if rest.unsolved > UNSOLVED * rest.ticks:
         yield Fault("unsolved", f"at rest the QP of {CONTROLLER} was not solved at {rest.unsolved} "
                                 f"of {rest.ticks} ticks: {why}")  # fmt: skip
+
+
+def _pushed(pushed: Pushed) -> Iterator[Fault]:
+    if pushed.falls:
+        shown = _first([f"{angle:g}°" for angle in pushed.falls], SHOWN)
+        yield Fault(
+            "pushed",
+            f"pushed by {SHARE:g} of its ankle limit it falls in {len(pushed.falls)} of "
+            f"{pushed.trials} directions ({shown}): {pushed.cause}; see the figures of torques, "
+            "joints and posture before any controller or gain is blamed",
+        )

@@ -17,7 +17,7 @@ SIZE = (420, 620)  # of a view [pixels]
 VIEWS = {"in front": (0.0, 6.0), "left": (90.0, 6.0), "obliquely": (40.0, 30.0)}  # [deg]
 
 
-def draw_robot(robot: Robot, path: str | Path) -> None:
+def write_picture(robot: Robot, path: str | Path) -> None:
     """Write a PNG file.
 
     Raises:

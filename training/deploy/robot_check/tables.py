@@ -12,12 +12,13 @@ from poise.training.running.tables import fact_table, text_table
 from .check import RobotCheck
 from .standing.holding import Holding
 from .standing.posture import Difference
+from .standing.pushed import SHARE, Pushed
 from .standing.rest import CONTROLLER, Rest
 
 EVERY = 2  # of the directions, in the table
 
 
-def print_check(check: RobotCheck, console: Console) -> None:
+def print_robot_check(check: RobotCheck, console: Console) -> None:
     """The robot, its directions, who can use it, what will go wrong."""
     console.print(fact_table(check.name, _rows(check)))
     console.print(_directions(check))
@@ -62,6 +63,8 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
         text = "no posture found" if holding is None else _holding(holding)
         yield f"on {foot} alone", text
     yield "at rest", _rest(check.rest)
+    if check.pushed.trials:
+        yield f"pushed, {SHARE:g} of the ankle limit", _pushed(check.pushed)
     model = check.dynamics
     yield "physics", (f"steps of {1000 * model.timestep:g} ms; friction of soles and ground "
                       f"{model.friction:g}")  # fmt: skip
@@ -69,6 +72,13 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
     pairs = len(check.self_contacts)
     yield "self-contacts", f"{pairs}, up to {1000 * depth:.1f} mm deep" if pairs else "none"
     yield "licence", check.licence or "not said"
+
+
+def _pushed(pushed: Pushed) -> str:
+    if not pushed.falls:
+        return f"recovers in {pushed.trials} of {pushed.trials} directions with {CONTROLLER}"
+    where = ", ".join(f"{angle:g}°" for angle in pushed.falls)
+    return f"falls in {len(pushed.falls)} of {pushed.trials} directions: {where}; {pushed.cause}"
 
 
 def _rest(rest: Rest) -> str:

@@ -5,10 +5,14 @@ from dataclasses import dataclass
 from poise.baselines.balance.stepping.capture_step import CaptureStep
 from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
 from poise.baselines.policy_files.config import PolicyFileConfig
-from poise.baselines.registry import ControllerConfig, controller_config, load_controller
+from poise.baselines.registry import (
+    ControllerConfig,
+    available_controllers,
+    controller_config,
+    load_controller,
+)
 from poise.baselines.walking.simbicon import SimbiconConfig
 from poise.configs.errors import PoiseError
-from poise.configs.files import packaged
 from poise.envs.robots.robot import Robot
 
 IN_PLACE, STEPPING = "in place", "stepping"
@@ -31,7 +35,7 @@ class Uses:
 
 def controllers_for(robot: Robot) -> dict[str, Uses]:
     """Family, `IN_PLACE` or `STEPPING` → its controllers; each is made once for the robot."""
-    configs = {name: controller_config(name) for name in packaged("controllers")}
+    configs = {name: controller_config(name) for name in available_controllers()}
     return {
         family: _uses(robot, {n: c for n, c in configs.items() if _family(c) == family})
         for family in (IN_PLACE, STEPPING)

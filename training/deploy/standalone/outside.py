@@ -47,7 +47,7 @@ class OutsideController:
     def _act(self) -> None:
         """Let the policy observe and act, where a policy step begins."""
         env = self._env
-        if env.episode.ticks[0] == 0:
+        if env.episode.ticks == 0:
             run(env.step_end().observe)
             env.set_action(self._agent.act(env.episode.observation.astype(np.float32)))
 

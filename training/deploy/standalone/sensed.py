@@ -14,7 +14,6 @@ from poise.envs.physics.state import RobotState
 from poise.envs.sensing.drawn import DrawnRobot
 from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.measurement import RING
-from poise.envs.sensing.motors import DAMPING, STIFFNESS, TARGET, TORQUE
 from poise.envs.sensing.realism import PARTS, Realism
 from poise.training.benchmarking.trials.agents import Agent
 
@@ -90,20 +89,20 @@ class MeasuredState(EstimatedState):
         """As of `EstimatedState`, from the measurements of `start`."""
         super().begin(drawn, holding)
         rings = self.sensors.rings
-        rings.next[0] = 0
+        rings.next = 0
         for i in range(-RING, 0):
             self.measure(self.start[max(len(self.start) + i, 0)])
-        rings.count[0] = 1
+        rings.count = 1
         self._begin_estimate()
 
     def measure(self, m: Measurement) -> None:
         """Take the measurement of the next physics step."""
         rings, bus = self.sensors.rings, self.bus
-        k, robot = int(rings.next[0]), self.plant.robot
+        k, robot = rings.next, self.plant.robot
         m.write(rings, k, robot)
         bus.q[:], bus.dq[:] = rings.q[k], rings.dq[k]
-        rings.next[0] = (k + 1) % RING
-        rings.count[0] += 1
+        rings.next = (k + 1) % RING
+        rings.count += 1
 
     def update(self) -> None:
         """Estimate the state from what has been measured."""
@@ -194,8 +193,8 @@ class SensedController(OutsideController):
         estimated, views = self._state.state_arrays, env.simulation.views
         views.qpos[:], views.qvel[:] = estimated.qpos, estimated.qvel
         env.tick()
-        asked = motors.asked[(motors.written[0] - 1) % len(motors.asked)]
-        return MotorCommand(*(asked[i].copy() for i in (TORQUE, TARGET, STIFFNESS, DAMPING)))
+        row = (motors.written - 1) % RING
+        return MotorCommand(*(each[row].copy() for each in motors.asked.members()))
 
 
 def typical(level: Realism) -> Realism:

@@ -13,13 +13,14 @@ from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_folder
+from poise.configs.problems import out_of_range
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.rates import seed_figures
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.curriculum import curriculum_levels
 from poise.training.learning.policy_files import CONFIG, LAST, find_checkpoint
-from poise.training.learning.train import check_folder, check_pushes, train
+from poise.training.learning.train import check_pushes, checkpoint_of, train
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.provenance import circumstances
@@ -66,12 +67,12 @@ def train_seeds(
     check_out_folder(out)
     check_backend(backend)
     if workers is not None and workers < 1:
-        raise ConfigError(f"must be at least 1, not {workers}", field="workers")
+        raise out_of_range(workers, field="workers", least=1)
     given, seeds = seeds, _all_seeds(seeds, out, resume)
     runs = [SeedRun(replace(config, seed=seed, threads=1), out / f"seed-{seed}") for seed in seeds]
     for run in runs:
         if find_checkpoint(run.folder / LAST) is not None:
-            check_folder(run.config, run.folder, resume=True)  # one of another configuration
+            checkpoint_of(run.config, run.folder, resume=True)  # one of another configuration
     missing = [run for run in runs if not run.entry()["finished"]]
     curriculum_levels(config)
     env = config.make_env()  # compiles all that the runs need, once
@@ -139,7 +140,7 @@ def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
     """Return the seeds of the folder and the given ones; refuses what is no list of seeds."""
     for seed in seeds:
         if seed < 0:
-            raise ConfigError(f"must be at least 0, not {seed}", field="seeds")
+            raise out_of_range(seed, field="seeds", least=0)
         if list(seeds).count(seed) > 1:
             raise ConfigError(f"{seed} is given twice", field="seeds")
     if find_checkpoint(out / LAST) is not None:

@@ -37,7 +37,7 @@ class Candidate:
     below: tuple[Trial, ...] = ()  # met by the policy on top of the controller
 
 
-def play(candidate: Candidate) -> tuple[list[float], list[float]]:
+def worth_of_trials(candidate: Candidate) -> tuple[list[float], list[float]]:
     """`worth` of each trial, alone and under the policy."""
     config = candidate.config
     robot = _robot(config.robot)
@@ -63,7 +63,7 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
     return alone, below
 
 
-def check_walks(controller: str, robot: Robot, walks: TuningWalks) -> None:
+def check_tuning_commands(controller: str, robot: Robot, walks: TuningWalks) -> None:
     """Raise ConfigError for a controller that does not walk, or that rejects the first commands."""
     env = ResidualBalanceEnv(robot, controller=controller_config(controller), pushes=None)
     for trial in walks.draw(0, robot, walks.first(robot)):
@@ -107,7 +107,7 @@ def _as_commanded(command: TimedCommand, outcome: Outcome) -> float:
     return float(UNQUIET + (1.0 - UNQUIET) * max(1.0 - off / SLACK, 0.0))
 
 
-def follow(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.ndarray:
+def follow_limits(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.ndarray:
     """Return limits (directions,) [N·s] nearer to where half of the pushes are recovered.
 
     `values` (candidates, directions, levels) is `worth`.

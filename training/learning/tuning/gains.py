@@ -14,7 +14,7 @@ from poise.envs.robots.robot import load_robot
 
 
 @dataclass(frozen=True)
-class Gain:
+class SearchedGain:
     """One number of the configuration, searched on a log or a linear scale."""
 
     path: str
@@ -52,13 +52,13 @@ class Gains:
         self.start = to_dict(controller_config(controller))
         for stand_in in ("uncertain", "uncertain_from"):  # this controller's gains are searched
             self.start.pop(stand_in, None)
-        self.gains: list[Gain] = []
+        self.gains: list[SearchedGain] = []
         body, numbers = load_robot(robot), _numbers(self.start)
         for path, (low, high) in ranges.items():
             if path not in numbers:
                 raise ConfigError("the controller has no such number", field=f"gains.{path}",
                                   choices=sorted(numbers))  # fmt: skip
-            gain = Gain(path, min(low, numbers[path]), max(high, numbers[path]))
+            gain = SearchedGain(path, min(low, numbers[path]), max(high, numbers[path]))
             self.gains.append(gain)
             for end in (gain.low, gain.high):
                 data = deepcopy(self.start)

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 
-class Pace:
+class GenerationPace:
     """How long the generations of one call take, and whether another one fits its minutes."""
 
     def __init__(self, minutes: float | None):

@@ -17,6 +17,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.extras import needing
 from poise.configs.files import resolve, write_atomic
 from poise.configs.outputs import check_out_folder
+from poise.configs.problems import out_of_range
 from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.robots.robot import load_robot
@@ -24,9 +25,9 @@ from poise.training.running.executor import Executor
 from poise.training.running.folder_lock import FolderLock, check_resume
 from poise.training.running.stopping import keeps
 
-from .candidates import Candidate, check_walks, follow, play
+from .candidates import Candidate, check_tuning_commands, follow_limits, worth_of_trials
 from .gains import Gains
-from .pace import Pace
+from .pace import GenerationPace
 from .tasks import TuneConfig
 
 CONFIG, GAINS, HISTORY = "config.yaml", "gains.yaml", "history.jsonl"
@@ -82,12 +83,12 @@ def tune(
     process searches there, or a file cannot be written.
     """
     if minutes is not None and not minutes > 0.0:
-        raise ConfigError(f"must be above 0, not {minutes}", field="minutes")
+        raise out_of_range(minutes, field="minutes", above=0)
     check_out_folder(out)
     _known(config, out, resume)  # what is refused makes no folder
     gains = Gains(config.controller, config.gains, config.robot)
     if config.walks is not None:
-        check_walks(config.controller, load_robot(config.robot), config.walks)
+        check_tuning_commands(config.controller, load_robot(config.robot), config.walks)
     if config.policy is not None:
         from poise.training.learning.policy import load_policy
 
@@ -100,7 +101,7 @@ def tune(
         for row in rows:
             search.again(row, out / HISTORY)
         write_atomic(out / CONFIG, to_yaml(config))
-        pace = Pace(minutes)
+        pace = GenerationPace(minutes)
         while search.generation < config.generations and pace.allows_another():
             rows.append(search.step(executor))
             pace.count()
@@ -163,7 +164,7 @@ class _Search:
             alone = ()
         jobs = [Candidate(number, config, self.gains.at(u), alone, below)
                 for number, u in enumerate(units)]  # fmt: skip
-        found = {job.number: values for job, values in executor.each(play, jobs)}
+        found = {job.number: values for job, values in executor.each(worth_of_trials, jobs)}
         row: Generation = {
             "generation": self.generation,
             "units": [u.tolist() for u in units],
@@ -206,7 +207,7 @@ class _Search:
             if worths[0]:
                 found = np.reshape(worths, shape)
                 scores += weight * found.mean(axis=(1, 2))
-                self.limits[k] = follow(self.limits[k], found)
+                self.limits[k] = follow_limits(self.limits[k], found)
         self.cma.tell(units, (-scores).tolist())
         better = np.argsort(-scores, kind="stable")[: (len(units) + 1) // 2]
         self.centres.append(np.mean([units[k] for k in better], axis=0))

@@ -9,10 +9,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.reference_motion import AHEAD, START, TURN, ReferenceMotion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion, WalkCommand
 from poise.baselines.balance.references.tempo import Tempo
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.engines.config import load_physics
@@ -22,13 +23,15 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, follows_no_motion, load_agent
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
 from poise.training.benchmarking.trials.play import Watch, run_trial
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
-from poise.training.motion.tracking.record import ANYWHERE, TrackingFigures
+from poise.training.motion.tracking.record import TrackingFigures
+
+from .footsteps import Steps
 
 PUSH_TIME = 0.1  # [s]
-LONGEST = 600.0  # [s]
 LITTLE = 0.2  # [m, rad]
 LEAN = 30.0  # [deg] beyond the motion's own largest tilt
 FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion itself goes low
@@ -45,6 +48,11 @@ class Followed(TrackingFigures):
     #: that is less than 0.2 m
     walked: float = np.nan
     turned: float = np.nan  #: the same of the turn; NaN if less than 0.2 rad is commanded
+    #: from here on as of `Footsteps`; NaN of a motion without steps
+    footsteps: float = np.nan
+    footsteps_kept: float = np.nan
+    footstep_delay: float = np.nan
+    footstep_place: float = np.nan
 
 
 def follow(
@@ -86,13 +94,13 @@ def follow(
             not from 0.1 to 10.
     """
     if not 0.1 <= speed <= 10.0:
-        raise ConfigError(f"must be from 0.1 to 10, not {speed:g}", field="tempo")
+        raise out_of_range(speed, field="tempo", least=0.1, most=10, form="g")
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
     whole_number(seed, 0, "seed")
     for name, size in (("impulse", impulse), ("share", share)):
         if not 0.0 <= size < np.inf:
-            raise ConfigError(f"must be at least 0, not {size:g}", field=name)
+            raise out_of_range(size, field=name, least=0, form="g")
     if impulse and share:
         raise ConfigError("give either an impulse or a share of J50", field="share")
     body = robot if isinstance(robot, Robot) else load_robot(robot)
@@ -110,16 +118,21 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        course = Course(reference.commands, None if watch is None else watch(trial))
+        steps = Steps(reference, None if watch is None else watch(trial))
+        course = FollowedWalk(reference.commands, steps)
         followed = _followed(run_trial(agent, trial, course), trial)
         walked, turned = course.shares()
-        trials.append(replace(followed, walked=walked, turned=turned))
+        number, kept, delay, place = steps.figures()
+        trials.append(replace(
+            followed, walked=walked, turned=turned, footsteps=number, footsteps_kept=kept,
+            footstep_delay=delay, footstep_place=place,
+        ))  # fmt: skip
         if trials[-1].fallen and not patient:
             break
     return trials
 
 
-class Course:
+class FollowedWalk:
     """Path of a robot while a walk is commanded: a `Watch` that also calls another."""
 
     def __init__(self, commands: np.ndarray | None, other: Watch | None = None):
@@ -128,7 +141,8 @@ class Course:
 
     def __call__(self, env: BalanceEnv) -> object:
         commands, time = self._commands, env.simulation.time
-        if commands is not None and commands[1, START] <= time <= commands[-1, START]:
+        starts = None if commands is None else np.asarray(WalkCommand(*commands.T).start)
+        if starts is not None and starts[1] <= time <= starts[-1]:
             state = env.simulation.state
             heading = np.arctan2(state.heading[1], state.heading[0])
             self._gone.append((*state.com[:2], heading))
@@ -142,7 +156,8 @@ class Course:
         yaw = np.unwrap(gone[:, 2])
         axes = np.column_stack([np.cos(yaw), np.sin(yaw)])[1:]
         way = float((np.diff(gone[:, :2], axis=0) * axes).sum())
-        asked = np.diff(commands[:, START]) @ commands[:-1, [AHEAD, TURN]]
+        start, ahead, _, turn, _ = WalkCommand(*commands.T)
+        asked = np.diff(start) @ np.stack([ahead, turn], axis=1)[:-1]
         done = np.array([way, yaw[-1] - yaw[0]])
         shares = np.where(np.abs(asked) > LITTLE, done / np.where(asked == 0.0, 1.0, asked), np.nan)
         return float(shares[0]), float(shares[1])

@@ -13,7 +13,7 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips, walking_clips
 from poise.baselines.motion.graphs.matching.database import MatchingDatabase
 from poise.baselines.motion.graphs.matching.features import seen_from, steady_heading
-from poise.baselines.motion.graphs.matching.player import Command, Matched, match_motion
+from poise.baselines.motion.graphs.matching.player import Matched, PlayerCommand, match_motion
 from poise.configs.errors import ConfigError, shown
 from poise.training.running.tables import text_table
 
@@ -23,7 +23,7 @@ FORM = "SECONDS:FORWARD,LEFT,TURN"
 MOST_ROWS = 60
 
 
-def parse_commands(texts: Sequence[str]) -> "Commands":
+def parse_timed_commands(texts: Sequence[str]) -> "Commands":
     """Commands by the time from which on they hold, as ``0:1.2,0,0``; before the first one none.
 
     Forward and left are in m/s, turning to the left in rad/s; what is left out at the end is 0.
@@ -31,7 +31,7 @@ def parse_commands(texts: Sequence[str]) -> "Commands":
     Raises ConfigError for other texts, times that do not increase, or more than 10 m/s or rad/s.
     """
     times: list[float] = []
-    commands = [Command()]
+    commands = [PlayerCommand()]
     for text in texts:
         head, colon, tail = text.partition(":")
         try:
@@ -47,7 +47,7 @@ def parse_commands(texts: Sequence[str]) -> "Commands":
             raise ConfigError(f"must begin after the one before it, not {shown(text)}",
                               field="commands")  # fmt: skip
         times.append(time)
-        commands.append(Command(*values))
+        commands.append(PlayerCommand(*values))
     return Commands(tuple(times), tuple(commands))
 
 
@@ -56,9 +56,9 @@ class Commands:
     """Commands by time: `commands[k + 1]` from `times[k]` [s] on, before the first time none."""
 
     times: tuple[float, ...]
-    commands: tuple[Command, ...]
+    commands: tuple[PlayerCommand, ...]
 
-    def __call__(self, time: float) -> Command:
+    def __call__(self, time: float) -> PlayerCommand:
         """Return the command at a time [s]."""
         return self.commands[bisect_right(self.times, time + 1e-9)]
 
@@ -70,13 +70,13 @@ def matched(
 
     Args:
         files: .bvh files or names of packaged clips; none for the packaged ones, walks too.
-        commands: see `parse_commands`.
+        commands: see `parse_timed_commands`.
         seconds: how long.
         start: ``CLIP@SECONDS`` where it begins; empty for the first frame of the first clip.
 
     Raises ConfigError for what cannot be used; see `MatchingDatabase` and `read_bvh`.
     """
-    asked = parse_commands(commands)
+    asked = parse_timed_commands(commands)
     if not 0.1 <= seconds <= LONGEST:
         raise ConfigError(f"must be from 0.1 to {LONGEST:g}, not {seconds:g}", field="seconds")
     names = list(files) or [*packaged_clips(), *walking_clips()]
@@ -90,7 +90,7 @@ BEYOND = 0.15  # of a command that no clip reaches: more is said
 LEAST = 0.1  # [m/s, rad/s] that always may be missed
 
 
-def reached(clip: Clip, commands: Commands) -> Iterator[tuple[float, Command, Command]]:
+def reached(clip: Clip, commands: Commands) -> Iterator[tuple[float, PlayerCommand, PlayerCommand]]:
     """For each command that holds for long enough: when, it, and the mean of what is done from 1 s
     after it: the way along where the body faces at the time, and the turn, over the time."""
     heading = steady_heading(clip)
@@ -106,14 +106,16 @@ def reached(clip: Clip, commands: Commands) -> Iterator[tuple[float, Command, Co
             yield (
                 start,
                 command,
-                Command(*map(float, (way[0] / time, way[1] / time, turned / time))),
+                PlayerCommand(*map(float, (way[0] / time, way[1] / time, turned / time))),
             )
 
 
-def beyond(command: Command, database: MatchingDatabase) -> Command | None:
+def beyond(command: PlayerCommand, database: MatchingDatabase) -> PlayerCommand | None:
     """What the clips have that is nearest to a command which none of them reaches, else None."""
     time = database.ahead[-1]
-    nearest = Command(*(value / time for value in database.nearest_way(command.future((time,)))))
+    nearest = PlayerCommand(
+        *(value / time for value in database.nearest_way(command.future((time,))))
+    )
     gap = float(np.linalg.norm(np.subtract(nearest, command)))
     return nearest if gap > max(LEAST, BEYOND * float(np.linalg.norm(command))) else None
 
@@ -142,7 +144,7 @@ def print_matched(
             console.print(f"{_said(command)} is beyond the clips, which have {_said(nearest)}")
 
 
-def _said(command: Command) -> str:
+def _said(command: PlayerCommand) -> str:
     """Return a command in words, without what it leaves out."""
     others = ((command.left, "m/s left"), (command.turning, "rad/s"))
     said = [f"{value:.2f} {unit}" for value, unit in others if abs(value) >= 0.005]

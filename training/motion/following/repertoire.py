@@ -1,8 +1,7 @@
-"""The motions of a suite: put on the robot once, kept beside the trials, the same for all."""
+"""The motions of a suite: put on the robot once, the same for all of its trials."""
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from poise.baselines.balance.references.motion import load_motion
@@ -10,7 +9,6 @@ from poise.baselines.balance.references.robot_clip import (
     RobotClip,
     read_robot_clip,
     reference_from,
-    write_robot_clip,
 )
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh, known_clips
@@ -18,29 +16,9 @@ from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.files import resolve
 from poise.configs.reading import is_file
 from poise.envs.robots.robot import Robot
+from poise.training.benchmarking.trials.repertoire import Repertoire, kept
 
-FOLDER = "motions"  # in that of the results
 STANDING = "standing"
-
-
-@dataclass(frozen=True)
-class Repertoire:
-    """The motions that the trials of a suite perform."""
-
-    durations: dict[str, float]  #: name → duration [s]
-    digests: dict[str, str]  #: name → hash of what decides it
-    clips: dict[str, RobotClip]  #: name → the robot's postures, of those that are not keyframes
-
-    def write(self, folder: Path) -> None:
-        """Keep the clips in the folder of the results; raise PoiseError if that fails."""
-        for name, clip in self.clips.items():
-            (folder / FOLDER).mkdir(exist_ok=True)
-            write_robot_clip(clip, kept(folder, name))
-
-
-def kept(folder: Path, name: str) -> Path:
-    """Where the clip of a motion is kept."""
-    return folder / FOLDER / f"{name}.npz"
 
 
 def is_clip(name: str) -> bool:

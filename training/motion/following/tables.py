@@ -18,10 +18,14 @@ from poise.training.running.tables import fact_table, text_table
 from .follow import Followed
 
 ERRORS = {*Followed.__dataclass_fields__} - {"motion_delay"}
-#: of a walk, whose path is commanded, and of every motion
+#: of a walk, whose path is commanded, of footsteps, and of every motion
 FIGURES = (
     Figure("walked", "walked", ".1f", "%", "of the commanded distance", 100.0),
     Figure("turned", "turned", ".1f", "%", "of the commanded turn", 100.0),
+    Figure("footsteps", "steps", ".0f", "%", "number of footsteps, of the motion's", 100.0),
+    Figure("footsteps_kept", "steps kept", ".0f", "%", "by the same foot within 0.1 s", 100.0),
+    Figure("footstep_delay", "step delay", ".2f", "s", "of all footsteps of a walk, taken off"),
+    Figure("footstep_place", "step places", ".0f", "mm", "from the other foot, mean error", 1e3),
     *(each for each in PERFORMED if each.key in ERRORS),
 )
 
@@ -109,7 +113,9 @@ def _steps(made: RetargetedClip) -> str:
         return "none"
     steps = int(np.sum(np.diff(planted.astype(int), axis=0) > 0))
     tempo = "" if made.tempo == 1.0 else f", {made.tempo:.0%} as fast as the clip"
-    return f"{steps}, {made.stride:.0%} of the length that the legs' scale gives{tempo}"
+    less = "" if made.spread == 1.0 else f", {made.spread:.0%} of the clip's width"
+    sunk = f", the body up to {100 * made.sunk:.1f} cm lower to reach" if made.sunk > 1e-3 else ""
+    return f"{steps}, {made.stride:.0%} of the length that the legs' scale gives{tempo}{less}{sunk}"
 
 
 def _walks(made: RetargetedClip) -> list[tuple[str, str]]:

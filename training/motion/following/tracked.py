@@ -18,6 +18,7 @@ from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.engines.config import load_physics
 from poise.envs.physics.engines.engine import check_engine
@@ -26,10 +27,11 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 from poise.envs.sensing.realism import load_realism
-from poise.training.motion.tracking.record import AFTER, ANYWHERE, COUNTED, LAST, SETTLING
+from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
+from poise.training.motion.tracking.record import AFTER, COUNTED, LAST, SETTLING
 from poise.training.motion.tracking.steps import NONE
 
-from .follow import LONGEST, PUSH_TIME, Followed
+from .follow import PUSH_TIME, Followed
 
 START_NOISE = 0.02  # [rad] of each joint of a start
 CLIPS = (".npz", ".csv")
@@ -103,7 +105,7 @@ def follow_clip(
         direction = 360.0 * k / directions % 360.0
         size = 0.0 if pushed is None else pushed(direction)
         if not 0.0 <= size < np.inf:
-            raise ConfigError(f"must be at least 0, not {size:g}", field="impulse")
+            raise out_of_range(size, field="impulse", least=0, form="g")
         push = Push(push_bodies(robot)[0], start, PUSH_TIME, size, direction) if size else None
         trials.append(_followed(env, track, seed + k, push))
     return trials
@@ -118,7 +120,7 @@ def _followed(
     until = max(ends + AFTER, 0.0 if push is None else push.start + SETTLING)
     pushes = [] if push is None else [asdict(push)]
     env.reset(seed=seed, options={"push": pushes, "qpos": _start(env, track, seed)})
-    reference, rest = Reference(env.robot, track), np.zeros(len(env.action_names))
+    reference, rest = ClipReference(env.robot, track), np.zeros(len(env.action_names))
     while not fallen and env.simulation.time < until - 0.5 * period:
         env.step_without_info(rest)
         step = round(env.simulation.time / period)
@@ -149,7 +151,7 @@ def _start(env: ResidualBalanceEnv, track: MotionTrack, seed: int) -> np.ndarray
     return qpos
 
 
-class Reference:
+class ClipReference:
     """Joints, bodies and CoM of a clip where it has been laid."""
 
     def __init__(self, robot: Robot, track: MotionTrack):

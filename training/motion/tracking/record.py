@@ -10,7 +10,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.state import RobotState
 
-from .reference import ReferenceBodies, Stance
+from .reference import ReferenceBodies, SolePlaces
 from .steps import NONE, StepErrors, StepFigures
 
 LAST = 1.0  # [s] at the end of a trial whose error is reported separately
@@ -19,14 +19,13 @@ AFTER = 3.0  # [s] that a trial goes on after the motion's end: a fall takes its
 SETTLING = 6.0  # [s] that it goes on after a push at least: steps home take as long
 LIFTED = 5  # policy steps off the ground after which a sole counts as landing again: 0.1 s
 LANDING = 25  # policy steps after which feet of a disturbed start have landed
-ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an episode
 
 
 @dataclass(frozen=True)
 class TrackingFigures(StepFigures):
     """How near a trial stayed to the motion; NaN where it fell at once."""
 
-    joint_rms: float  #: root mean square of joint errors [rad]
+    joint_rms: float  #: root mean square of joint errors [rad], of a walk of trunk and arms alone
     #: mean distance of the bodies from where the motion has them, on the soles as they stand [m]
     #: (MPKPE)
     body_error: float
@@ -52,7 +51,7 @@ class Tracking:
     def __init__(self, env: ResidualBalanceEnv, pushes: Sequence[float] = ()):
         self.fallen = False  #: so far
         self._env, self._reference = env, ReferenceBodies(env.motion, env.robot)
-        self._footing = Footing(env.simulation.state)
+        self._footing = FeetRecord(env.simulation.state)
         self._end = max([0.0, *(start + SETTLING for start in pushes)])
         self._errors: list[tuple[float, float, float, float]] = []
         self._counted = 0  # of them
@@ -74,7 +73,7 @@ class Tracking:
         if not self.fallen:
             stance = self._footing.stance
             if self._steps is not None:
-                stance = Stance.of(env.simulation.state)
+                stance = SolePlaces.of(env.simulation.state)
                 self._steps.update()
             self._errors.append(tracking_errors(env, self._reference, stance))
             self._counted += env.motion_time < env.motion.duration + COUNTED
@@ -101,7 +100,7 @@ class Tracking:
         )
 
 
-class Footing:
+class FeetRecord:
     """The stance of a robot's feet, and how far they have moved.
 
     Attributes:
@@ -113,7 +112,7 @@ class Footing:
     """
 
     def __init__(self, state: RobotState):
-        self.stance, self.slide = Stance.of(state), 0.0
+        self.stance, self.slide = SolePlaces.of(state), 0.0
         self._landed: np.ndarray | None = None
         self._off = np.zeros(2, int)  # policy steps since a sole touched the ground
         self._steps = 0
@@ -122,7 +121,7 @@ class Footing:
         """Call it after every policy step."""
         self._steps += 1
         if np.all(state.contacts > 0.0):
-            self.stance = Stance.of(state)
+            self.stance = SolePlaces.of(state)
         if self._landed is None and self._steps >= LANDING:
             self._landed = state.sole_points.copy()
         if self._landed is not None:
@@ -147,7 +146,7 @@ def lies(env: ResidualBalanceEnv) -> bool:
 
 
 def tracking_errors(
-    env: ResidualBalanceEnv, reference: ReferenceBodies, stance: Stance
+    env: ResidualBalanceEnv, reference: ReferenceBodies, stance: SolePlaces
 ) -> tuple[float, float, float, float]:
     """Mean square of the joints, mean distance of the bodies, the same relative to the root, and
     the distance of the CoM."""
@@ -156,7 +155,7 @@ def tracking_errors(
     root = int(np.searchsorted(reference.bodies, reference.robot.root_body_id))
     gap = sim.data.xpos[reference.bodies] - places
     return (
-        float(np.mean((sim.data.qpos[7:] - joints) ** 2)),
+        float(np.mean((sim.data.qpos[7:] - joints)[reference.led] ** 2)),
         float(np.linalg.norm(gap, axis=1).mean()),
         float(np.linalg.norm(gap - gap[root], axis=1).mean()),
         float(np.linalg.norm(sim.state.com - reference.com)),

@@ -18,7 +18,7 @@ MOST, CLOSE = 10, 1e-5  # iterations, and the error [m, rad] that ends them
 RANK = 1e-3  # of the largest singular value: legs that cannot reach a sole do not try
 
 
-class Stance(NamedTuple):
+class SolePlaces(NamedTuple):
     """Where both soles are: points (2, 3) [m], axes (2, 3, 3), heading (cos, sin) of the mean."""
 
     points: np.ndarray
@@ -26,7 +26,7 @@ class Stance(NamedTuple):
     heading: np.ndarray
 
     @classmethod
-    def of(cls, state: RobotState) -> Stance:
+    def of(cls, state: RobotState) -> SolePlaces:
         """Return the stance of a robot at this moment."""
         return cls(state.sole_points.copy(), state.sole_axes.copy(), state.heading.copy())
 
@@ -47,6 +47,7 @@ class ReferenceBodies:
 
     Attributes:
         bodies: (n,) bodies that are compared: the robot's own, which move.
+        led: joints that follow the motion: all, but of a walk by commands those of trunk and arms.
         com: (3,) where the CoM is to be, at the last time that was asked for [m].
         origin, turn: (3,), (3, 3) of the motion's frame then: that of the soles as they stand, or
             the one that a motion with steps has of its own.
@@ -60,10 +61,12 @@ class ReferenceBodies:
         moving[0] = False
         self.bodies = np.flatnonzero(moving)
         self._legs = _leg_dofs(robot)
+        own = np.setdiff1d(np.arange(model.nv - 6), self._legs - 6)
+        self.led: slice | np.ndarray = slice(None) if motion.commands is None else own
         self._correction = np.zeros(len(self._legs))  # where the last search ended
         self.com, self.origin, self.turn = np.zeros(3), np.zeros(3), np.eye(3)
 
-    def at(self, time: float, stance: Stance) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, time: float, stance: SolePlaces) -> tuple[np.ndarray, np.ndarray]:
         """Joints (nj,) [rad] as the motion has them and places of the bodies (n, 3) [m].
 
         Trunk, arms, the root's orientation and the CoM are the motion's, in the heading frame of
@@ -93,7 +96,7 @@ class ReferenceBodies:
         return sample.q_ref, data.xpos[self.bodies].copy()
 
     def _on_planted_soles(
-        self, footing: Footing, time: float, stance: Stance
+        self, footing: Footing, time: float, stance: SolePlaces
     ) -> tuple[np.ndarray, np.ndarray]:
         """The same of a motion with steps, whose own frame is put on the soles that are planted."""
         data, sample, joints = self._data, footing.sample(time), self.motion.sample(time).q_ref
@@ -121,7 +124,7 @@ class ReferenceBodies:
         """(nq,) the posture at the last time that was asked for."""
         return self._data.qpos.copy()
 
-    def poses(self, time: float, stance: Stance) -> tuple[np.ndarray, np.ndarray]:
+    def poses(self, time: float, stance: SolePlaces) -> tuple[np.ndarray, np.ndarray]:
         """Where all bodies are at a time [s], about soles that stand as in `stance`.
 
         Returns:
@@ -130,7 +133,7 @@ class ReferenceBodies:
         self.at(time, stance)
         return self._data.xpos.copy(), self._data.xquat.copy()
 
-    def _miss(self, stance: Stance, com: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _miss(self, stance: SolePlaces, com: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (15,) misses of CoM and soles [m, rad], and their (15, nv) Jacobian."""
         robot, data, model = self.robot, self._data, self.robot.model
         mujoco.mj_kinematics(model, data)

@@ -45,14 +45,15 @@ class StepErrors:
         if not isinstance(controller, MotionStep):
             return
         performance = controller.performance
-        if performance is None or not performance.performing[0]:
+        if performance is None or not performance.performing:
             self._resting, self._swung = [None, None], [False, False]
             return
-        x, y, ground, cos, sin = performance.frame
+        p = performance
+        x, y, ground, cos, sin = p.x, p.y, p.floor, p.cos, p.sin
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         sample = self._footing.sample(self._env.motion_time)
         places = sample.places[:, 0] @ turn.T + [x, y, ground]
-        state, begun = self._env.simulation.state, controller.memory.steps[0] > 0
+        state, begun = self._env.simulation.state, controller.memory.steps > 0
         for foot in range(2):
             gap = state.sole_points[foot] - places[foot]
             if not sample.planted[foot]:
@@ -81,5 +82,5 @@ class StepErrors:
             float(np.sqrt(np.mean(self._swing))) if self._swing else np.nan,
             max(self._placed, default=np.nan),
             self._slide,
-            float(performance.left[0]),
+            float(performance.left),
         )

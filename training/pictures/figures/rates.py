@@ -96,7 +96,7 @@ def level_curves(
             draw_line(ax, s, s.x + shift, s.y, s.name)
             draw_marks(ax, s, ".0%", x=s.x + shift)
         ax.set_xlim(-edge, len(levels) - 1 + edge)
-        ax.set_xticks(range(len(levels)), [short(level_text(level), 14) for level in levels])
+        ax.set_xticks(range(len(levels)), [shortened(level_text(level), 14) for level in levels])
         legend_below(figure)
 
 
@@ -115,7 +115,7 @@ def forest(out: Out, series: Sequence[Series], title: str, form: str) -> None:
         ax = figure.add_subplot()
         for k, s in enumerate(series):
             draw_marks(ax, s, form, x=np.array([float(k)]), across=True)
-        ax.set_yticks(range(len(series)), [short(s.name, 20) for s in series])
+        ax.set_yticks(range(len(series)), [shortened(s.name, 20) for s in series])
         ax.set_ylim(len(series) - 0.5, -0.5)
         ax.grid(False, axis="y")
         ax.set_xlabel(title)
@@ -144,7 +144,7 @@ def level_text(level: str) -> str:
     return f"−{level[1:]}" if level.startswith("-") else level
 
 
-def short(text: str, length: int) -> str:
+def shortened(text: str, length: int) -> str:
     """Return the beginning of a long text."""
     return text if len(text) <= length else text[: length - 1] + "…"
 

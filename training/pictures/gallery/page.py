@@ -13,6 +13,7 @@ from rich.console import Console
 
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
+from poise.configs.problems import out_of_range
 from poise.envs.physics.pushes.push import Push
 from poise.training.benchmarking.diagnosis.words import towards
 from poise.training.benchmarking.results.read import Record, Results, load_results
@@ -99,7 +100,7 @@ def write_gallery(
 def choose(results: Results, names: Sequence[str], sizes: int) -> list[Record]:
     """The trials that are shown, by sector and by impulse: of one push, met by all of `names`."""
     if sizes < 1:
-        raise ConfigError(f"must be at least 1, not {sizes}", field="sizes")
+        raise out_of_range(sizes, field="sizes", least=1)
     met = [{record.met for record in results.of(name)} for name in names]
     for name in names:
         results.record(name, results.records[0].trial)  # refuses who took no part

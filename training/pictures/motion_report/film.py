@@ -15,7 +15,7 @@ from poise.training.pictures.figures.video import usual
 from poise.training.pictures.sessions.ghost import Ghost, ghost_of
 
 
-class Film(ExitStack):
+class MotionFilm(ExitStack):
     """Films the first trial of `follow`, which calls it; use as a context, which writes the file.
 
     Args:
@@ -39,7 +39,7 @@ class Film(ExitStack):
         self._renderer: SceneRenderer | None = None
         self._ghost: Ghost | None = None
 
-    def __enter__(self) -> Film:
+    def __enter__(self) -> MotionFilm:
         self._send = self.enter_context(encoded(self.path, self.size, self.rate))
         return self
 

@@ -35,10 +35,10 @@ def timeline_picture(record: Mapping[str, Any], trace: Trace | None = None) -> P
     try:
         parts = [(str(p["what"]), float(p["begins"]), float(p["ends"]), bool(p["wanted"]),
                   p["coefficient"] is not None or p.get("physics") is not None,
-                  p.get("physics")) for p in record["played"]]  # fmt: skip
+                  p.get("physics")) for p in record["parts"]]  # fmt: skip
         duration = float(record["duration"])
     except (KeyError, TypeError, ValueError, AttributeError):
-        raise ConfigError("holds no record of a script", field="played") from None
+        raise ConfigError("holds no record of a script", field="parts") from None
     caption = ("Columns follow each other, rows happen at once. Between the clips stand the "
                "transitions, filled, with their durations; broken outlines are clips that the "
                "script did not ask for.")  # fmt: skip

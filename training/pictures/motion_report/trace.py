@@ -8,8 +8,8 @@ import numpy as np
 from poise.baselines.balance.references.tempo import Tempo
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.balance.base import BalanceEnv
-from poise.training.motion.tracking.record import Footing, tracking_errors
-from poise.training.motion.tracking.reference import ReferenceBodies, Stance
+from poise.training.motion.tracking.record import FeetRecord, tracking_errors
+from poise.training.motion.tracking.reference import ReferenceBodies, SolePlaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +54,11 @@ class Tracer:
         state = env.simulation.state
         if self._reference is None:
             self._reference = ReferenceBodies(env.motion, env.robot)
-            self._footing = Footing(state)
+            self._footing = FeetRecord(state)
         self._footing.update(state)
         self._fallen = bool(env.fallen)
         steps = env.motion.footing
-        stance = self._footing.stance if steps is None else Stance.of(state)
+        stance = self._footing.stance if steps is None else SolePlaces.of(state)
         joints, bodies, _, com = tracking_errors(env, self._reference, stance)
         away = state.com - self._reference.com
         tempo = env.tempo if env.tempo.waits else Tempo()

@@ -86,7 +86,7 @@ class Table:
                 if column.ends:
                     line += cell.ends or (None, None)
             lines.append(line)
-        return csv_text(header, lines)
+        return cells_csv(header, lines)
 
     @property
     def download(self) -> Download:
@@ -119,7 +119,7 @@ def download(name: str, text: str, pack: bool = False) -> Download:
     return Download(name, Markup(url), len(content))
 
 
-def csv_text(header: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
+def cells_csv(header: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
     """CSV with a header; None is an empty field."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

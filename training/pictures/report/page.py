@@ -12,7 +12,11 @@ from poise.baselines.allowance import allow_words, allowing
 from poise.configs.errors import PoiseError, raised
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
-from poise.training.benchmarking.evaluation.tables import assisted, walked
+from poise.training.benchmarking.evaluation.tables import (
+    assisted,
+    judged_by_falls,
+    stand_in_notes,
+)
 from poise.training.benchmarking.results.read import Record, Results, load_results
 from poise.training.benchmarking.trials.agents import code_of
 from poise.training.pictures.figures.style import Inline
@@ -30,7 +34,7 @@ from .worst_trials import (
     Film,
     can_draw,
     choose_exhibits,
-    film,
+    film_again,
     frame_times,
     signals_csv,
 )
@@ -82,7 +86,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
     tables = {
         "ranking": report_tables.ranking(results, baseline),
         "directions": report_tables.directions(results),
-        "pairs": report_tables.pairs(results),
+        "pairs": report_tables.paired_rows(results),
         "factors": factors.factor_table(results),
         "sensitivity": factors.sensitivity(results, order),
         "indicators": factors.indicators(results, order),
@@ -95,7 +99,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "motions": walking.motion_table(results, order),
         "in_motion": walking.in_motion_table(results, order),
         "smallest": report_tables.smallest(results, order),
-        "losses": report_tables.losses(results, order),
+        "losses": report_tables.loss_rows(results, order),
     }
     cases, notes = _cases(results, films, console)
     envelope, own_envelopes = plots.envelopes(results)
@@ -123,12 +127,12 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         factors=factors.factor_plots(results, order),
         cases=cases,
         signal_keys=signal_keys(),
-        notes=notes,
+        notes=[*stand_in_notes(results.summary), *notes],
         facts=_facts(results),
         trials=trials if trials.size <= PACKED else None,
         summary_file=_file(results, SUMMARY, JSON_BYTES),
         crowded=len(order) > CROWD,
-        by_falls=walked(results.summary["controllers"]),
+        by_falls=judged_by_falls(results.summary["controllers"]),
     )  # fmt: skip
 
 
@@ -170,7 +174,7 @@ def _film(
     console: Console,
 ) -> Film | None:
     try:
-        return film(results, record, times, draw)
+        return film_again(results, record, times, draw)
     except PoiseError as error:
         reason = str(error)
     except Exception as error:  # a controller from outside may raise anything
@@ -213,7 +217,7 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
         })  # fmt: skip
     return {
         "case": case,
-        "facts": words.push_text(record, trial),
+        "facts": words.push_and_conditions(record, trial),
         "end": _ending(record),
         "why": record.why,
         "films": parts,

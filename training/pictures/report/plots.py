@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 from markupsafe import Markup
 
-from poise.training.benchmarking.evaluation.tables import walked
+from poise.training.benchmarking.evaluation.tables import judged_by_falls
 from poise.training.benchmarking.metrics.evaluated import DIRECTIONAL, WALK_PUSH
 from poise.training.benchmarking.results.read import Results
 from poise.training.benchmarking.statistics.fits import fit_logistic, trial_bins
@@ -20,7 +20,7 @@ from poise.training.pictures.figures.style import INLINE, Inline, look, sample
 from poise.training.running.columns import J50_MEAN, Entry
 from poise.training.running.summary import both_ends
 
-from .cells import Download, csv_text, download
+from .cells import Download, cells_csv, download
 
 SMALL = 2.2  # width of one controller's own picture [in]
 PARTS = {"envelope": "Standard pushes", "grid": "Grid of pushes", "random": "Random pushes",
@@ -55,7 +55,7 @@ def forests(results: Results) -> list[Markup]:
             upright.append(series(name, index, [100.0 * np.array([0.0, rate, *ends])]))
     pictures = []
     titled = [(recovered, "recovered trials [%]"), (upright, "trials without a fall [%]")]
-    if walked(entries):
+    if judged_by_falls(entries):
         titled = [titled[1], (recovered, "trials that go on as commanded [%]")]
     for found, title in ((j50, J50_MEAN.heading), *titled):
         if found:
@@ -126,7 +126,7 @@ def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
         picture, own = _falls(results, part)
         pictures.append((PARTS[part], picture))
         lines += own
-    return pictures, download("fall_curves.csv", csv_text(CURVES, lines)) if lines else None
+    return pictures, download("fall_curves.csv", cells_csv(CURVES, lines)) if lines else None
 
 
 def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]]]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from poise.training.benchmarking.evaluation.tables import places, walked
+from poise.training.benchmarking.evaluation.tables import judged_by_falls, shared_ranks
 from poise.training.benchmarking.results.read import Results
 from poise.training.running.columns import (
     AGAINST,
@@ -60,7 +60,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
     entries, rated = results.summary["controllers"], results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
     second = replace(NOT_FALLEN, ends="")  # there is no room for two intervals
-    rates = (NOT_FALLEN, AS_COMMANDED) if walked(entries) else (RECOVERED, second)
+    rates = (NOT_FALLEN, AS_COMMANDED) if judged_by_falls(entries) else (RECOVERED, second)
     columns: tuple[Column, ...] = (
         RANK, CONTROLLER, J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST,
         replace(J50_SCALED, unit=f"× {results.summary['scale']}",
@@ -69,7 +69,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
         replace(TRIED[0], words=f"that the rate is of{mix}"),
         *AGAINST, P_VALUE, ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT,
     )  # fmt: skip
-    rank, against = places(entries), _against(results, baseline)
+    rank, against = shared_ranks(entries), _against(results, baseline)
     rows = [
         {**entries[name], **against.get(name, APART), "controller": name, "rank": rank[name]}
         for name in results.summary["ranking"]
@@ -80,7 +80,7 @@ def ranking(results: Results, baseline: str) -> Table | None:
     return entry_table("ranking", caption, columns, rows)
 
 
-def pairs(results: Results) -> Table | None:
+def paired_rows(results: Results) -> Table | None:
     """Return every pair of controllers on the same trials; None of one alone."""
     columns = (*PAIR, *PAIRED, P_VALUE, GAIN)
     return entry_table("pairs", "All pairs on the same trials.", columns, results.summary["pairs"])
@@ -108,7 +108,7 @@ def _against(results: Results, baseline: str) -> dict[str, Entry]:
     return found
 
 
-def losses(results: Results, order: Sequence[str]) -> Table | None:
+def loss_rows(results: Results, order: Sequence[str]) -> Table | None:
     """How often what was the cause of a loss; None in older results, and where nothing was lost."""
     caption = "Causes of lost trials, the most frequent one of each controller first."
     columns = (CONTROLLER, LOSSES, Text("cause", "cause"))

@@ -6,8 +6,8 @@ from poise.training.benchmarking.diagnosis.words import towards
 from poise.training.benchmarking.evaluation.tables import (
     SEPARATED,
     assisted,
-    places,
-    walked,
+    judged_by_falls,
+    shared_ranks,
 )
 from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.trials.trial import Trial
@@ -25,7 +25,7 @@ def lead(results: Results) -> list[str]:
     unfair = len(fair) < len(results.controllers)
     alone = " of those that take no force from outside" if unfair else ""
     what = "random trials" if summary["rated"] else "trials"
-    ranks = places(summary["controllers"])
+    ranks = shared_ranks(summary["controllers"])
     tied = [name for name in fair if ranks[name] == 1 and name != first]
     place = "comes first"
     if tied:
@@ -36,7 +36,7 @@ def lead(results: Results) -> list[str]:
     upright = best.get("never_fell_rate")
     if upright is None:
         said = [f"{first} {place}{alone}: it recovers {rate:.1%} of {tried}."]
-    elif walked(summary["controllers"]):
+    elif judged_by_falls(summary["controllers"]):
         said = [f"{first} {place}{alone}: it does not fall in {upright:.1%} of {tried}, and goes "
                 f"on as commanded in {rate:.1%}."]  # fmt: skip
     else:
@@ -44,7 +44,7 @@ def lead(results: Results) -> list[str]:
                 f"{upright:.1%}."]  # fmt: skip
     if "j50_mean" in best:
         around = both_ends(best["j50_mean_ci95"])
-        fell = walked(summary["controllers"])
+        fell = judged_by_falls(summary["controllers"])
         text = f"{'It falls in half' if fell else 'Half'} of its trials"
         text += f"{'' if fell else ' are recovered'} at {best['j50_mean']:.1f} N·s"
         text += f" (95 % {around[0]:.1f} to {around[1]:.1f})" if around else ""
@@ -70,7 +70,7 @@ def _not_separated(summary: Summary, first: str, second: str) -> str:
     return "" if p < SEPARATED else f"{words} (McNemar p = {p:.2f})"
 
 
-def push_text(record: Record, trial: Trial) -> str:
+def push_and_conditions(record: Record, trial: Trial) -> str:
     """Return the first push in words, and in what the trial differs from the standard one."""
     if not math.isfinite(record.impulse):
         return "No push."

@@ -14,9 +14,9 @@ from poise.envs.viewing.camera import Camera, beside
 from poise.envs.viewing.renderer import SceneRenderer
 from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.results.replay import replay
-from poise.training.benchmarking.trials.signals import Signals
+from poise.training.benchmarking.trials.signals import TrialSignals
 
-from .cells import Download, csv_text, download
+from .cells import Download, cells_csv, download
 
 FRAMES = 8  # of a strip
 SIZE = (216, 264)  # of a frame [pixels], shown at half of it: sharp on a phone
@@ -57,7 +57,7 @@ class Film:
     """
 
     record: Record
-    signals: Signals
+    signals: TrialSignals
     frames: Sequence[tuple[float, bytes]]
     same: bool
 
@@ -98,14 +98,14 @@ def smallest_lost(results: Results, name: str) -> list[Record]:
     return sorted(lost, key=_size)
 
 
-def film(results: Results, record: Record, times: Sequence[float], draw: bool = True) -> Film:
+def film_again(results: Results, record: Record, times: Sequence[float], draw: bool = True) -> Film:
     """Play a trial again; `times` [s] are those of the frames, if any are drawn.
 
     Raises:
         ConfigError: the controller or the robot is no longer what was evaluated.
         PoiseError: nothing can be drawn here.
     """
-    signals, camera = Signals(), _FrameTaker(times if draw else (), record.direction)
+    signals, camera = TrialSignals(), _FrameTaker(times if draw else (), record.direction)
 
     def watch(env: BalanceEnv) -> None:
         signals(env)
@@ -172,7 +172,7 @@ def signals_csv(name: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> 
     header += ["support_x_low", "support_x_high", "support_y_low", "support_y_high", "torque"]
     blocks += [columns["support"].reshape(len(t), 4), columns["torque"][:, None]]
     lines = [[f"{value:.5g}" for value in line] for line in np.hstack(blocks)]
-    return download(f"{name}.csv", csv_text(header, lines))
+    return download(f"{name}.csv", cells_csv(header, lines))
 
 
 def compressed(frame: np.ndarray) -> bytes:

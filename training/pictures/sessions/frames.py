@@ -10,11 +10,12 @@ from poise.baselines.controller import BaseController
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
+from poise.envs.terrain.arrays import SURFACE
 from poise.envs.terrain.terrain import Surface, height_at
 from poise.envs.viewing.contact_forces import ContactForces
 from poise.envs.viewing.overlays import Mark, foothold_mark, marks
 
-from .ghost import Ghost, Poses, Seen, ghost_of
+from .ghost import Ghost, GhostBodies, Poses, ghost_of
 
 #: value of a frame → title of its plot
 VALUES = {
@@ -25,7 +26,7 @@ VALUES = {
 }
 
 
-LEVEL = np.zeros((0, 6))  # no surfaces
+LEVEL = np.zeros(0, SURFACE)  # no surfaces
 
 
 class Frame(NamedTuple):
@@ -40,8 +41,8 @@ class Frame(NamedTuple):
         fall_time: when it fell [s]; None: it has not.
         ghost: where the bodies are if the reference motion is followed exactly; None: it has none
             that moves.
-        surfaces: (n, 6) of the ground, as `Surface`; the same array for as long as it is the same
-            ground.
+        surfaces: (n,) of the ground, see `surface_arrays`; the same array for as long as it is the
+            same ground.
         floor: height of the plane below them [m].
     """
 
@@ -57,7 +58,7 @@ class Frame(NamedTuple):
     floor: float = 0.0
 
 
-def between(first: Frame, second: Frame, fraction: float) -> Frame:
+def frame_between(first: Frame, second: Frame, fraction: float) -> Frame:
     """Bodies between two frames, for slow motion; everything else is that of the second one."""
     ghost = second.ghost
     if first.ghost is not None and ghost is not None:
@@ -76,7 +77,7 @@ def _between(first: Poses, second: Poses, fraction: float) -> Poses:
     )
 
 
-class Observer:
+class FrameMaker:
     """Makes the frames of an environment, which is only read.
 
     Args:
@@ -87,7 +88,7 @@ class Observer:
     def __init__(self, env: BalanceEnv, seen: RobotClip | None = None):
         self._env, self._seen = env, seen
         self._forces = ContactForces(env.simulation)
-        self._ghost: Ghost | Seen | None = None
+        self._ghost: Ghost | GhostBodies | None = None
         self._surfaces = LEVEL
 
     def __call__(self, fall_time: float | None = None) -> Frame:
@@ -115,7 +116,7 @@ class Observer:
         """Return the ghost's bodies at a time [s]; after a reset it stands where the robot does."""
         if time == 0.0:
             robot, seen = self._env.robot, self._seen
-            self._ghost = ghost_of(self._env) if seen is None else Seen(seen, robot)
+            self._ghost = ghost_of(self._env) if seen is None else GhostBodies(seen, robot)
         return None if self._ghost is None else self._ghost(time)
 
     def _footholds(self) -> list[Mark]:

@@ -1,6 +1,6 @@
 """The ghost of a motion: where the robot is if it follows its reference exactly."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.robot_clip import RobotClip
+from poise.baselines.extras import load_extra
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot
-from poise.training.motion.tracking.reference import ReferenceBodies, Stance
 
 
 class Poses(NamedTuple):
@@ -27,8 +27,10 @@ class Ghost:
     """
 
     def __init__(self, motion: ReferenceMotion, env: BalanceEnv):
-        self._bodies = ReferenceBodies(motion, env.robot)
-        self._stance, self._footing = Stance.of(env.simulation.state), motion.footing
+        what = f"the motion {motion.name!r}"
+        self._bodies = load_extra("motions", "bodies", what)(motion, env.robot)
+        self._stance = load_extra("motions", "sole_places", what).of(env.simulation.state)
+        self._footing = motion.footing
         self._bodies.at(0.0, self._stance)
         self._frame = self._bodies.origin.copy(), self._bodies.turn.copy()
 
@@ -41,7 +43,7 @@ class Ghost:
         self._bodies.at(time, self._soles(time))
         return self._bodies.posture
 
-    def _soles(self, time: float) -> Stance:
+    def _soles(self, time: float) -> Any:
         """Where its soles are."""
         if self._footing is None:
             return self._stance
@@ -52,7 +54,7 @@ class Ghost:
         return self._stance._replace(points=points, axes=axes)
 
 
-class Seen:
+class GhostBodies:
     """The bodies of postures that can only be seen, from where the robot stood at its reset."""
 
     def __init__(self, clip: RobotClip, robot: Robot):

@@ -14,7 +14,7 @@ from poise.configs.errors import PoiseError
 from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import Robot
 
-from .frames import Frame, Observer
+from .frames import Frame, FrameMaker
 from .session import Session, load_player
 from .spec import SessionSpec, TrialSpec
 
@@ -54,7 +54,7 @@ class Live:
         self._spec = SessionSpec(names, session.robot.name) if spec is None else spec
         self.session, self._motion = session, motion
         self.names, self.robot, self.period = session.names, session.robot, session.period
-        self._observers = [Observer(side.env, seen) for side in session.sides]
+        self._observers = [FrameMaker(side.env, seen) for side in session.sides]
         self._begin()
 
     @property

@@ -7,7 +7,8 @@ from pathlib import Path
 import yaml
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.robot_clip import check_robot, read_robot_clip
+from poise.baselines.balance.references.robot_clip import check_clip_robot, read_robot_clip
+from poise.baselines.extras import load_extra
 from poise.baselines.walking.schedule import parse_commands
 from poise.configs.errors import ConfigError, shown
 from poise.configs.yaml_loader import Loader
@@ -37,10 +38,11 @@ def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: Non
         Path(spec.motion).suffix == ".npz"
         and (clip := read_robot_clip(spec.motion)).about.unperformed
     ):
-        check_robot(clip, robot, spec.motion)
+        check_clip_robot(clip, robot, spec.motion)
         seen = clip
     elif spec.motion != STANDING:
         motion = load_motion(spec.motion, robot)
+        load_extra("motions", "performer", f"the motion {motion.name!r}")  # before all that waits
     say(f"loading {', '.join(spec.controllers)}")
     session = load_session(
         spec.controllers, robot, spec.seed, pushes, commands=commands, motion=motion,

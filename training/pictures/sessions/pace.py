@@ -8,7 +8,7 @@ BACKLOG = 0.1  # [s] of simulated time that may be caught up; more than that is 
 WINDOW = 2.0  # [s] over which the factor of this moment is taken
 
 
-class Pace:
+class RealTimePace:
     """Compute how many steps are due, and how close to real time they run.
 
     Args:

@@ -16,7 +16,7 @@ from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import replay
 from poise.training.benchmarking.trials.trial import Outcome
 
-from .frames import Frame, Observer
+from .frames import Frame, FrameMaker
 from .live import Frames, Recorded
 from .spec import MOST, TrialSpec
 
@@ -27,11 +27,11 @@ class Recorder:
     def __init__(self) -> None:
         self.frames: list[Frame] = []
         self.env: BalanceEnv | None = None
-        self._observer: Observer | None = None
+        self._observer: FrameMaker | None = None
 
     def __call__(self, env: BalanceEnv) -> None:
         if self._observer is None:
-            self.env, self._observer = env, Observer(env)
+            self.env, self._observer = env, FrameMaker(env)
         self.frames.append(self._observer(env.simulation.time if env.fallen else None))
 
     def fall(self) -> None:

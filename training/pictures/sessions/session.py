@@ -7,6 +7,7 @@ import numpy as np
 
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.environments.commanded import CommandedEnv
+from poise.baselines.extras import load_extra
 from poise.baselines.registry import walking_controllers
 from poise.baselines.walking.planner.command import GaitCommand, command_of
 from poise.baselines.walking.planner.reach import Reach, shared_reach
@@ -19,7 +20,6 @@ from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.benchmarking.trials.play import SteppedTrial
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.motion.following.follow import performer
 
 LONGEST = 1e5  # [s] after which a session would end by itself: a day
 SOON = 1e-9  # [s] by which times may round
@@ -206,8 +206,11 @@ def load_player(
     duration: float,
     realism: str = IDEAL,
 ) -> Agent:
-    """Return a controller of a session that lasts `duration` [s]; errors as of `load_session`."""
+    """Return a controller of a session that lasts `duration` [s]; errors as of `load_session`,
+    and MissingExtra for a motion without poise[motion]."""
     if motion is None:
         level = load_realism(realism)
         return load_agent(name, robot, duration=duration, pushes=None, realism=level)
-    return performer(name, robot, motion, duration, realism=realism)
+    performer = load_extra("motions", "performer", f"the motion {motion.name!r}")
+    agent: Agent = performer(name, robot, motion, duration, realism=realism)
+    return agent

@@ -12,6 +12,7 @@ from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.baselines.walking.walk import allocate_gait, limits_of_legs
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_file
+from poise.configs.problems import out_of_range
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.engines.config import load_physics
 from poise.envs.physics.engines.engine import check_engine
@@ -34,7 +35,7 @@ Say = Callable[[str], object]  # prints a line
 
 
 @allows("controller")
-def walk(
+def play_walk(
     command: Mapping[str, float | None],
     *,
     duration: float = 20.0,
@@ -75,7 +76,7 @@ def walk(
         check_video(video)
         check_out_file(video, "video")
     if seed < 0:
-        raise ConfigError(f"must be at least 0, not {seed}", field="seed")
+        raise out_of_range(seed, field="seed", least=0)
     loaded = load_robot(robot)
     commands = parse_commands(command, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)

@@ -10,16 +10,16 @@ import viser
 
 from poise.configs.errors import PoiseError, raised
 from poise.envs.viewing.quantities import Quantity
-from poise.training.pictures.sessions.frames import between
+from poise.training.pictures.sessions.frames import frame_between
 from poise.training.pictures.sessions.live import Frames, Play
 from poise.training.pictures.sessions.mouse import Pull
-from poise.training.pictures.sessions.pace import Pace
+from poise.training.pictures.sessions.pace import RealTimePace
 from poise.training.pictures.sessions.spec import SessionSpec, Spec, TrialSpec, choices, read_link
 
 from .pages import Pages, send_films, send_picture
 from .panel import OPACITY, Panel, Wishes, status
 from .plots import Plots
-from .stage import BACKGROUND, Stage, set_look
+from .stage import BACKGROUND, ViewStage, set_look
 from .walking import Throttle
 
 FRAME = 1.0 / 30.0  # [s] between two pictures
@@ -44,7 +44,7 @@ class BrowserView:
 
     def __init__(self, server: viser.ViserServer, play: Play, load: Load, dark: bool = False):
         self._server, self._load, self._jobs = server, load, queue.SimpleQueue[Job]()
-        self.pace, self.paused = Pace(), False
+        self.pace, self.paused = RealTimePace(), False
         self._opacity, self._hidden, self._following = OPACITY, set[Quantity](), True
         self._sliders = Throttle(COMMAND)  # what they ask for
         self._drawn = self._shown = -1e9  # when the last picture and status were shown [s]
@@ -71,7 +71,7 @@ class BrowserView:
         """Show this."""
         self.play = play
         grabbed = partial(self.ask, self._pulled)
-        self.stage = Stage(self._server, play.robot, play.names, grabbed, self._opacity)
+        self.stage = ViewStage(self._server, play.robot, play.names, grabbed, self._opacity)
         self._pages.point_cameras()
         self.stage.marks.hidden, self.stage.following = self._hidden, self._following
         with self._tab:
@@ -86,7 +86,7 @@ class BrowserView:
     def run(self, seconds: float | None = None) -> None:
         """Play, for some seconds of the wall clock or until the process is stopped."""
         end = time.monotonic() + (float("inf") if seconds is None else seconds)
-        self.pace = Pace()
+        self.pace = RealTimePace()
         while (now := time.monotonic()) < end:
             self._advance()
             if now - self._drawn >= FRAME:
@@ -223,7 +223,7 @@ class BrowserView:
         if self.paused or self.pace.speed >= 1.0 or at == 0:
             return history[at]
         pairs = zip(history[at - 1], history[at], strict=True)
-        return tuple(between(first, second, self.pace.phase) for first, second in pairs)
+        return tuple(frame_between(first, second, self.pace.phase) for first, second in pairs)
 
     def _changed(self) -> None:
         """Redraw everything in the next picture."""

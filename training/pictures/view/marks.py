@@ -49,7 +49,7 @@ class MarkSet:
         self.handle.batched_scales, self.handle.batched_colors = scales, colours
 
 
-class Marks:
+class SceneMarks:
     """The marks of `count` robots below the scene's node `root`; `hidden` are not shown."""
 
     def __init__(self, scene: viser.SceneApi, root: str, count: int):

@@ -11,7 +11,7 @@ from poise.envs.viewing.renderer import SceneRenderer
 from poise.envs.viewing.window import Viewer
 from poise.training.pictures.sessions.live import Live
 from poise.training.pictures.sessions.mouse import DURATION, WEIGHT, Pull, grabbed_point
-from poise.training.pictures.sessions.pace import Pace
+from poise.training.pictures.sessions.pace import RealTimePace
 
 from .server import until_ctrl_c
 
@@ -28,7 +28,7 @@ class NativeView:
     """Plays a session of one controller in MuJoCo's window until that is closed."""
 
     def __init__(self, live: Live):
-        self.live, self.paused, self.pace = live, False, Pace()
+        self.live, self.paused, self.pace = live, False, RealTimePace()
         self._keys = queue.SimpleQueue[int]()  # pressed, in the window's thread
         simulation = live.session.sides[0].env.simulation
         self.renderer = SceneRenderer(simulation, human=True, keys=self._keys.put)
@@ -37,7 +37,7 @@ class NativeView:
     def run(self, seconds: float | None = None) -> None:
         """Play, for some seconds of the wall clock or until the window is closed."""
         end = time.monotonic() + (float("inf") if seconds is None else seconds)
-        self.pace = Pace()
+        self.pace = RealTimePace()
         while self.renderer.is_open and time.monotonic() < end:
             while not self._keys.empty():
                 self.press(self._keys.get())

@@ -14,7 +14,7 @@ from PIL import Image
 from poise.configs.errors import PoiseError
 from poise.training.pictures.sessions.live import Play
 
-from .stage import PHONE, Stage
+from .stage import PHONE, ViewStage
 
 CLOSE = 6.0  # [s] after which a message disappears
 #: [s] for a browser to draw a picture: in software seconds, on a busy machine a minute
@@ -29,7 +29,7 @@ class Pages:
     late, until the user has moved the camera.
     """
 
-    def __init__(self, server: viser.ViserServer, stage: Callable[[], Stage]):
+    def __init__(self, server: viser.ViserServer, stage: Callable[[], ViewStage]):
         self._server, self._stage = server, stage
         self._phones: dict[int, bool] = {}  # page → whether its controls are below
         self._last: tuple[float, str, Colour] = (-np.inf, "", None)  # last message: when, what

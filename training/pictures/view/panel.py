@@ -14,7 +14,7 @@ from poise.envs.physics.pushes.options import body_names
 from poise.envs.viewing.quantities import QUANTITIES, Quantity
 from poise.training.pictures.sessions.live import Play
 from poise.training.pictures.sessions.mouse import DURATION, WEIGHT
-from poise.training.pictures.sessions.pace import Pace
+from poise.training.pictures.sessions.pace import RealTimePace
 from poise.training.pictures.sessions.spec import MOST, NO_CONTROLLER, Choices, Spec, TrialSpec
 
 from .walking import WalkSliders
@@ -228,7 +228,9 @@ class Panel:
         return callback
 
 
-def status(play: Play, paused: bool, pace: Pace, pulled: Mapping[str, object] | None = None) -> str:
+def status(
+    play: Play, paused: bool, pace: RealTimePace, pulled: Mapping[str, object] | None = None
+) -> str:
     """What stands above the controls: time, how near to real time it is, who has fallen, and why.
 
     While a body is dragged, `pulled` are the fields of the push that it would be.

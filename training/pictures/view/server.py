@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.extras import how_to_install
+from poise.configs.problems import out_of_range
 from poise.training.running.stopping import stop_code
 
 from .origins import LOOPBACK, Visits, own_pages_only
@@ -37,7 +38,7 @@ def check_installed() -> None:
 def check_port(host: str, port: int) -> None:
     """Raises ConfigError where nothing can listen there; port 0 is any that is free."""
     if not 0 <= port <= 65535:
-        raise ConfigError(f"must be from 0 to 65535, not {port}", field="port")
+        raise out_of_range(port, field="port", least=0, most=65535)
     try:
         family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind) as probe:

@@ -17,7 +17,7 @@ from poise.envs.viewing.quantities import REFERENCE
 from poise.training.pictures.sessions.frames import Frame, ground_at
 from poise.training.pictures.sessions.mouse import Pull, pull
 
-from .marks import Marks
+from .marks import SceneMarks
 from .robots import Robots
 
 ROOT = "/world"  # of the scene, moved against the robot
@@ -38,7 +38,7 @@ Triangles = tuple[np.ndarray, np.ndarray]
 Grabbed = Callable[[str, Pull], None]  # phase of the drag, what it is now
 
 
-class Stage:
+class ViewStage:
     """What is seen of robots of one kind, one for each name.
 
     Args:
@@ -66,7 +66,7 @@ class Stage:
         self._root = scene.add_frame(ROOT, show_axes=False)
         self.robots = Robots(scene, ROOT, robot, count, opacity)
         self.ghosts: Robots | None = None  #: of the reference motion, where there is one
-        self.marks = Marks(scene, ROOT, count)
+        self.marks = SceneMarks(scene, ROOT, count)
         self._ground: list[np.ndarray] = []  # surfaces that are drawn
         self.boxes: list[viser.MeshHandle] = []  #: of the ground
         self._names = [
@@ -179,7 +179,7 @@ def _below(frame: Frame) -> np.ndarray:
 
 
 def ground_meshes(surfaces: np.ndarray, floor: float, half: float) -> dict[int, Triangles]:
-    """Boxes between the surfaces (n, 6) and the floor [m]: it lets through what is below it.
+    """Boxes between the surfaces (n,) and the floor [m]: it lets through what is below it.
 
     Args:
         surfaces: as of `Surface`.

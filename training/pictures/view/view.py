@@ -5,6 +5,7 @@ from pathlib import Path
 
 from poise.baselines.allowance import allows, listed
 from poise.configs.errors import ConfigError
+from poise.configs.problems import out_of_range
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.names import check_names
 from poise.training.pictures.sessions.live import Play
@@ -118,7 +119,7 @@ def _check(spec: SessionSpec, seconds: float | None, native: bool) -> None:
 
 def _check_seconds(seconds: float | None) -> None:
     if seconds is not None and not seconds > 0.0:
-        raise ConfigError(f"must be above 0, not {seconds}", field="seconds")
+        raise out_of_range(seconds, field="seconds", above=0)
 
 
 def _load_session(spec: Spec) -> Play:

@@ -28,7 +28,8 @@ OnRobot = Annotated[
 Backend = Annotated[
     Literal["local", "joblib", "ray"],
     tyro.conf.arg(
-        help="local (processes of this machine), joblib (the same by joblib), ray (a cluster)."
+        help="where trials run: local (processes of this machine), joblib (the same by joblib), "
+        "ray (a cluster)."
     ),
 ]
 Json = Annotated[

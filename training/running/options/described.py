@@ -1,19 +1,22 @@
-"""Options of a configuration, described by the docstrings of its fields."""
+"""Options of a command or a configuration, described by docstrings."""
 
 import dataclasses
 import inspect
 import re
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import tyro
 
 from poise.configs.kinds import OfKind
 
 ENTRY = re.compile(r"\s{4}(\w+): (.+)")  # of `Attributes:` or `Args:`, one level below it
 SECTION = re.compile(r"(?:Attributes|Args):\n(.*?)(?:\n\n|\Z)", re.DOTALL)
+WIDE = 50  # characters of names from which their list may break into lines
 BOUNDS = {"min": "at least", "above": "above", "max": "at most"}
-KINDS = {int: "INT", float: "NUMBER", str: "NAME"}
+KINDS = {int: "N", float: "NUMBER", str: "NAME"}
 
 
 @dataclass(frozen=True)
@@ -21,11 +24,13 @@ class Option:
     """An option of a command.
 
     Attributes:
-        name: with its dashes.
-        kind: form of its value.
+        name: with its dashes; of a positional argument what stands for it, without any.
+        kind: form of its value; empty for a switch and a positional argument.
         sentence: meaning, with unit.
         default: default value as text; empty without one.
         bounds: valid range of a number as text; empty without one.
+        required: whether a command does not run without it.
+        switch: whether it takes no value; with both forms, ``--x`` and ``--no-x``, or the first.
     """
 
     name: str
@@ -33,6 +38,17 @@ class Option:
     sentence: str
     default: str
     bounds: str = ""
+    required: bool = False
+    switch: Literal["", "one", "both"] = ""
+
+    @property
+    def heading(self) -> str:
+        """The option as a user writes it."""
+        if self.switch == "both":
+            before, _, last = self.name.rpartition(".")
+            no = f"{before}.no-{last}" if before else f"--no-{self.name[2:]}"
+            return f"{self.name}, {no}"
+        return f"{self.name} {self.kind}".rstrip()
 
     @property
     def group(self) -> str:
@@ -65,12 +81,45 @@ def sentences(cls: type) -> dict[str, str]:
     for field in dataclasses.fields(cls):
         if "formula" in field.metadata:
             texts[field.name] = f"Weight of the term {field.metadata['formula']}."
-    return {name: _sentence(text) for name, text in texts.items()}
+    return {name: _sentence(text.replace("None: ", "not given: ")) for name, text in texts.items()}
 
 
 def _sentence(text: str) -> str:
     text = text[0].upper() + text[1:]
     return text if text.endswith(".") else f"{text}."
+
+
+def arguments_of(function: Callable[..., object]) -> list[Option]:
+    """Return the arguments of a command, by its signature and the entries of its docstring.
+
+    What several commands share is described by its type: help and metavar of `tyro.conf.arg`.
+    """
+    texts, hints = entries(inspect.getdoc(function)), get_type_hints(function, include_extras=True)
+    return [
+        _argument(parameter, hints[name], texts.get(name, ""))
+        for name, parameter in inspect.signature(function).parameters.items()
+    ]
+
+
+def _argument(parameter: inspect.Parameter, hint: Any, text: str) -> Option:
+    marks: tuple[Any, ...] = ()
+    if get_origin(hint) is Annotated:
+        hint, *found = get_args(hint)
+        marks = tuple(found)
+    text = text or next((each.help for each in marks if getattr(each, "help", None)), "")
+    kind = next((each.metavar for each in marks if getattr(each, "metavar", None)), kind_of(hint))
+    required = parameter.default is inspect.Parameter.empty
+    default = "" if required else _text(parameter.default)
+    if parameter.kind is parameter.POSITIONAL_ONLY:
+        return Option(kind, "", _sentence(text), default, required=required)
+    own = next((each.name for each in marks if getattr(each, "name", None)), parameter.name)
+    name = f"--{own.replace('_', '-')}"
+    if hint is not bool:
+        return Option(name, kind, _sentence(text), default, required=required)
+    one = tyro.conf.FlagCreatePairsOff in marks
+    return Option(
+        name, "", _sentence(text), "" if one else default, switch="one" if one else "both"
+    )
 
 
 def options_of(config: Any, prefix: str = "--") -> Iterator[Option]:
@@ -93,8 +142,10 @@ def options_of(config: Any, prefix: str = "--") -> Iterator[Option]:
             for key, each in value.items():
                 yield Option(f"{name}.{key}", "NUMBER", sentence, _text(each), _bounds(field))
         elif not any(map(dataclasses.is_dataclass, get_args(hints[field.name]))):
-            yield Option(name, kind_of(hints[field.name]), texts.get(field.name, ""), _text(value),
-                         _bounds(field))  # fmt: skip
+            switch = hints[field.name] is bool
+            yield Option(name, "" if switch else kind_of(hints[field.name]),
+                         texts.get(field.name, ""), _text(value), _bounds(field),
+                         switch="both" if switch else "")  # fmt: skip
     for value, deeper in below:
         yield from options_of(value, deeper)
 
@@ -103,19 +154,21 @@ def kind_of(hint: Any) -> str:
     """Return the form of a value of this type on the command line."""
     origin, args = get_origin(hint), get_args(hint)
     if origin is Literal:
-        return "|".join(str(arg) for arg in args)
+        names = [str(arg) for arg in args]
+        return "|".join(names) if sum(map(len, names)) < WIDE else " | ".join(names)
     if origin in (Union, types.UnionType):
         return "|".join(kind_of(arg) for arg in args if arg is not type(None))
     if origin is tuple:
         return f"{kind_of(args[0])} …" if args[-1] is Ellipsis else " ".join(map(kind_of, args))
     if origin is dict:
         return "NAME NUMBER …"
-    return "yes|no" if hint is bool else KINDS.get(hint, "PATH")
+    return "" if hint is bool else KINDS.get(hint, "PATH")
 
 
 def _text(value: Any) -> str:
+    """Return a default as text, empty where none is set: the sentence says what holds then."""
     if value is None or value == () or value == {}:
-        return "none"
+        return ""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -54,7 +54,7 @@ class Named(TypedDict, total=False):
     about: str
 
 
-def named() -> dict[str, list[Named]]:
+def names_by_kind() -> dict[str, list[Named]]:
     """Return all packaged names by kind, with their facts."""
     known = _known()
     return {kind: [_named(kind, name, known) for name in packaged(kind)] for kind in KINDS}

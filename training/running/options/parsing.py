@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import inspect
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -11,16 +10,19 @@ from typing import Any, TypeVar
 import tyro
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.problems import Problem
+from poise.training.running.terminal import terminal
 
+from .described import Option, arguments_of
+from .pages import print_help
 from .spelling import suggestion
 
 T = TypeVar("T")
-NUMBERS = {"invalid literal for int() with base 10: ": "must be a whole number, not ",
-           "could not convert string to float: ": "must be a number, not "}  # fmt: skip
-WRONG = {r"invalid choice ('.*') for argument '(.*)'. Expected one of \((.*?),?\)":
-         "{1}: must be one of {2}, not {0}",
-         r"Missing value for argument '(.*)'. Expected (\d+) value": "{0}: needs {1} behind it",
-         }  # fmt: skip
+HELP = {"-h", "--help", "--help-all"}
+NUMBERS = {r"invalid literal for int\(\) with base 10: (.*)": "a whole number",
+           r"could not convert string to float: (.*)": "a number"}  # fmt: skip
+CHOICE = re.compile(r"invalid choice ('.*') for argument '(.*)'. Expected one of \((.*?),?\)")
+NO_VALUE = re.compile(r"Missing value for argument '(.*)'. Expected (\d+) value")
 
 
 def parsed(function: Callable[..., T], args: Sequence[str], prog: str) -> Callable[[], T]:
@@ -36,28 +38,25 @@ def parsed(function: Callable[..., T], args: Sequence[str], prog: str) -> Callab
     def later(*given: Any, **named: Any) -> Callable[[], T]:
         return functools.partial(function, *given, **named)
 
-    with one_line_errors(prog, option_names(function), args):
+    with one_line_errors(prog, arguments_of(function), args):
         return tyro.cli(later, prog=prog, args=list(args))
 
 
 def answered(function: Callable[..., object], args: Sequence[str], prog: str) -> int:
-    """Call a function with these arguments; return the int that it returns as exit code, else 0.
+    """Call a function with these arguments, or print its help; return the int that it returns as
+    exit code, else 0.
 
     Raises as `parsed`, and whatever the function raises.
     """
-    given = ["--help" if arg == "--help-all" else arg for arg in args]  # it lists all
-    code = parsed(function, given, prog)()
+    if not HELP.isdisjoint(args):
+        print_help(function, prog, terminal())
+        return 0
+    code = parsed(function, args, prog)()
     return code if isinstance(code, int) else 0
 
 
-def option_names(function: Callable[..., object]) -> list[str]:
-    """Return the options made of a function's parameters."""
-    parameters = inspect.signature(function).parameters.values()
-    return [f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is not p.POSITIONAL_ONLY]
-
-
 @contextlib.contextmanager
-def one_line_errors(prog: str, options: Iterable[str], args: Sequence[str]) -> Iterator[None]:
+def one_line_errors(prog: str, options: Iterable[Option], args: Sequence[str]) -> Iterator[None]:
     """Convert tyro's error output and exit with code 2 to a ConfigError."""
     said = io.StringIO()
     try:
@@ -69,23 +68,26 @@ def one_line_errors(prog: str, options: Iterable[str], args: Sequence[str]) -> I
         raise _error(said.getvalue(), prog, list(options), args) from None
 
 
-def _error(said: str, prog: str, options: list[str], args: Sequence[str]) -> ConfigError:
+def _error(said: str, prog: str, options: list[Option], args: Sequence[str]) -> ConfigError:
     """Return the error in a box printed by tyro, as one line."""
     lines = _first_part(said)
     text = " ".join(line.strip() for line in lines)
     if "nrecognized" in text:
-        return _unknown(text, prog, options, args)
+        return _unknown(text, prog, [each.name for each in options if each.name[:1] == "-"], args)
     if lines and lines[0].lstrip().startswith("Missing from"):
-        needed = [line.strip() for line in lines if re.match(r" {4}\S", line)]
-        return ConfigError(f"needs {', '.join(needed)}", source=_command(prog))
+        headings = {option.name: option.heading for option in options}
+        found = [line.strip() for line in lines if re.match(r" {4}\S", line)]
+        needed = [headings.get(line.split()[0], line) for line in found]
+        return Problem("needs", _command(prog), what=", ".join(needed))
     if wrong := re.match(r"Error parsing ([^:]+): (.*)", text):
-        message = wrong[2]
-        for before, after in NUMBERS.items():
-            message = message.replace(before, after)
-        return ConfigError(message, source=_command(prog), field=wrong[1])
-    for pattern, message in WRONG.items():
-        if found := re.match(pattern, text):
-            return ConfigError(message.format(*found.groups()), source=_command(prog))
+        for pattern, expected in NUMBERS.items():
+            if no := re.search(pattern, wrong[2]):
+                return Problem("type", _command(prog), wrong[1], expected=expected, value=no[1])
+        return ConfigError(wrong[2], source=_command(prog), field=wrong[1])
+    if choice := CHOICE.match(text):
+        return Problem("choice", _command(prog), choice[2], valid=choice[3], value=choice[1])
+    if lacking := NO_VALUE.match(text):
+        return Problem("no value", _command(prog), lacking[1], count=lacking[2])
     return ConfigError(text or "cannot be read", source=_command(prog))
 
 
@@ -120,8 +122,6 @@ def _unknown(text: str, prog: str, options: list[str], args: Sequence[str]) -> C
     wrong = next((arg for arg in args if arg.partition("=")[0] == named), named)
     flag = wrong.partition("=")[0]
     if not flag.startswith("-"):
-        return ConfigError(f"takes no {shown(flag)}: see {prog} --help", source=_command(prog))
-    hint = suggestion(flag, options) or ";"
-    return ConfigError(
-        f"no such option{hint} {prog} --help lists them", source=_command(prog), field=flag
-    )
+        return Problem("unknown argument", _command(prog), value=shown(flag), prog=prog)
+    hint = f"{suggestion(flag, options) or ';'} {prog} --help lists them"
+    return Problem("unknown option", _command(prog), flag, hint=hint)

@@ -10,11 +10,13 @@ from typing import Annotated
 
 import numpy as np
 
+from poise.baselines.balance.references.targets import Offsets
 from poise.baselines.controller import TargetArrays
 from poise.baselines.whole_body.momentum_qp import Tick
 from poise.baselines.whole_body.tick import ContactTick
-from poise.envs.compiled.block import Block, Integer, Number
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -22,19 +24,15 @@ from .cop_region import CopRegion
 from .feedback import FeedbackArrays
 from .swing import Swing
 
-#: entries of `Search.best`: foothold [m], time from now to touchdown [s], cost [m], and the part of
-#: the time that feedback and a policy added [s]
-BEST_X, BEST_Y, BEST_TIME, BEST_COST, BEST_OFFSET = range(5)
 
-
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Search(Block):
     """A search for a step: `StepLimits` and `FootholdChoice` in SI units, the step that is being
     weighed, and the best one so far."""
 
     state: StateArrays
     region: CopRegion
-    offsets: np.ndarray  # (13,) see `StepOffsets`
+    offsets: Offsets
     feedback: FeedbackArrays
     heading: Annotated[np.ndarray, 2]  # cosine and sine of the step's heading
     foot_sign: np.ndarray  # (2,) 1 for the left foot, −1 for the right one
@@ -56,16 +54,20 @@ class Search(Block):
     corners: Annotated[np.ndarray, "k", 2]  # scratch: what the stance sole reaches [m]
     cop: Annotated[np.ndarray, 2]  # the point of it that is nearest to ξ [m]
     start: Annotated[np.ndarray, 2]  # where the foot is [m]
-    foot: Integer  # the foot that is to step
-    time: Number  # from now to touchdown [s]
+    foot: Mutable[int]  # the foot that is to step
+    time: Mutable[float]  # from now to touchdown [s]
     foothold: Annotated[np.ndarray, 2]  # for this foot and time [m]
-    cost: Number  # of this foothold, without the price of its time [m]
-    best: Annotated[np.ndarray, 5]  # the best step, see BEST_X to BEST_OFFSET
-    best_foot: Integer  # its foot; −1: none yet
+    cost: Mutable[float]  # of this foothold, without the price of its time [m]
+    best_x: Mutable[float]  # foothold of the best step [m]
+    best_y: Mutable[float]
+    best_time: Mutable[float]  # from now to its touchdown [s]
+    best_cost: Mutable[float]  # [m]
+    best_offset: Mutable[float]  # part of its time that feedback and a policy added [s]
+    best_foot: Mutable[int]  # its foot; −1: none yet
     foothold_rule: "Kernel[Search]"  # finds `foothold` and `cost`, as `capture_foothold` does
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Recentring(Block):
     """A `RecentringConfig` in SI units, and how far the robot is on its way."""
 
@@ -81,12 +83,20 @@ class Recentring(Block):
     margin: float  # [m]
     cop_distance: float  # [m]
     nominal: np.ndarray  # (2,) from the second sole to the first one in the nominal stance [m]
-    stage: Integer  # INACTIVE, SHIFTING, SWINGING or LOADING
-    foot: Integer  # the foot that goes back to its nominal place
-    homing: Integer  # 1 from the lift-off of that foot until a fall begins
+    stage: Mutable[int]  # INACTIVE, SHIFTING, SWINGING or LOADING
+    foot: Mutable[int]  # the foot that goes back to its nominal place
+    homing: Mutable[int]  # 1 from the lift-off of that foot until a fall begins
     slip_time: Annotated[np.ndarray, 2]  # for which each foot that should stand has had no hold [s]
-    timer: Number  # for which it has been calm; while SHIFTING, since that began [s]
+    timer: Mutable[float]  # for which it has been calm; while SHIFTING, since that began [s]
     capture_target: Annotated[np.ndarray, 2]  # where ξ is brought [m]
+
+
+#: of `StepGains` those that the legs' limits give, in a step and in a gait
+LEG_NUMBERS = ("leg_length", "root_accel", "swing_accel", "joint_accel")
+#: of `StepLimits` those that a `Search` has
+SEARCHED = (
+    "ahead", "behind", "width_min", "width_max", "speed", "side_speed", "time_min", "time_max",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,25 +122,25 @@ class StepGains(Block):
     period: float  # of a tick [s]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class StepMemory(Block):
     """The memory of a controller that steps, from tick to tick."""
 
-    steps: Integer  # steps begun since the reset
-    recovering: Integer  # 1 from a step until the robot is calm in its nominal stance
-    foot: Integer  # the foot that stepped last; −1: none
-    swinging: Integer  # 1 while that foot swings, or is about to leave
+    steps: Mutable[int]  # steps begun since the reset
+    recovering: Mutable[int]  # 1 from a step until the robot is calm in its nominal stance
+    foot: Mutable[int]  # the foot that stepped last; −1: none
+    swinging: Mutable[int]  # 1 while that foot swings, or is about to leave
     level_frame: Annotated[np.ndarray, 3, 3]  # axes of a level sole along the heading of the step
-    clock: Number  # since the last touchdown [s]
-    load: Number  # that the foot bore when its step began [N]
-    load_fraction: Number  # of this load that it still bears
+    clock: Mutable[float]  # since the last touchdown [s]
+    load: Mutable[float]  # that the foot bore when its step began [N]
+    load_fraction: Mutable[float]  # of this load that it still bears
     region: Annotated[np.ndarray, "2n+1", 2]  # CoP region of both soles since touchdown [m]
-    corners: Integer  # how many rows of it count; 0: it is not known
-    moved: Integer  # 1 once the motion has moved
-    return_fraction: Number  # of the way from the stance's posture to the motion's
+    corners: Mutable[int]  # how many rows of it count; 0: it is not known
+    moved: Mutable[int]  # 1 once the motion has moved
+    return_fraction: Mutable[float]  # of the way from the stance's posture to the motion's
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class CaptureTick(Block):
     """All that a tick of `CaptureStep` works on."""
 
@@ -143,14 +153,14 @@ class CaptureTick(Block):
     swing: Swing
     memory: StepMemory
     recentring: Recentring
-    offsets: np.ndarray  # (13,) see `StepOffsets`
+    offsets: Offsets
     on_first: ContactTick  # QP with the first sole in contact
     on_second: ContactTick  # QP with the second sole in contact
     on_both: ContactTick  # QP with both soles in contact
     standing: Tick  # QP with feet fixed, before the first step
     tau: np.ndarray  # (nv−6,) torques of the tick [N·m]
     vdot: np.ndarray  # (nv,) accelerations that they are to bring
-    failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
+    failures: Mutable[int]  # ticks since the reset that could not be solved
     corners: Annotated[np.ndarray, "k", 2]  # scratch
     cloud: Annotated[np.ndarray, "n", 2]  # scratch
     pair: Annotated[np.ndarray, 2]  # scratch

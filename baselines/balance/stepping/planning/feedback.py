@@ -21,29 +21,55 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.envs.compiled.block import Block
+from poise.envs.compiled.block import Block, named_entries
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along, turned
+from poise.envs.compiled.mutable import Mutable
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 
 from .config import FallFeedback, PivotConfig, StepFeedback
 
-# rows of K
-AHEAD, OUTWARD, TIME, HEIGHT = range(4)
-# its columns, in the order of `SIGNALS`
-(
-    CONSTANT, LATER_STEP, PHASE, CAPTURE_AHEAD, CAPTURE_OUTWARD,
-    LEAN_AHEAD, LEAN_OUTWARD, MOMENTUM_AHEAD, MOMENTUM_OUTWARD,
-) = range(9)  # fmt: skip
-PLAN, SWING, STANCE = range(3)  # rows of the pivot's gains
-LX, LY = 3, 4  # of the centroidal momentum [P; L]
+
+@dataclass(eq=False)
+class Signals(Block):
+    """The signals s in the order of `SIGNALS`: `values`, and each by its name."""
+
+    values: np.ndarray  # (9,)
+    constant: Mutable[float]
+    later_step: Mutable[float]  # kernels that plan set this one and `phase`
+    phase: Mutable[float]
+    capture_ahead: Mutable[float]
+    capture_outward: Mutable[float]
+    lean_ahead: Mutable[float]
+    lean_outward: Mutable[float]
+    momentum_ahead: Mutable[float]
+    momentum_outward: Mutable[float]
+
+
+@dataclass(eq=False)
+class Changes(Block):
+    """Δ = K s in the order of the rows of K: `values`, and each by its name."""
+
+    values: np.ndarray  # (4,)
+    ahead: Mutable[float]  # [m]
+    outward: Mutable[float]  # [m]
+    time: Mutable[float]  # [s]
+    height: Mutable[float]  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Pivot(Block):
+    """Gains of the point about which the trunk turns, see `PivotConfig`."""
+
+    momentum: float  # [m/(N·m·s)]
+    lean: float  # [m]
 
 
 @dataclass(frozen=True, eq=False)
 class FeedbackArrays(Block):
-    """K of a `StepFeedback` for one robot, the signals s, and Δ = K s; rows as in `feedback.py`."""
+    """K of a `StepFeedback` for one robot, the signals s, and Δ = K s."""
 
     always: Annotated[np.ndarray, 4, 9]  # K in m and s
     angles: Annotated[np.ndarray, "n"]  # directions of falls, rising [rad]
@@ -52,11 +78,12 @@ class FeedbackArrays(Block):
     upright: np.ndarray  # (3,) the vertical at rest, in the root's axes
     height: float  # h [m]
     momentum_unit: float  # ω/(m g h) [1/(N·m·s)]
-    # of a plan, in a swing, on both feet: momentum [m/(N·m·s)], lean [m]
-    pivot: Annotated[np.ndarray, 3, 2]
+    plan: Pivot  # of a plan
+    swing: Pivot
+    stance: Pivot  # on both feet
     lateral_fraction: float  # of these across the heading
-    signals: Annotated[np.ndarray, 9]  # s; kernels that plan set LATER_STEP and PHASE
-    added: Annotated[np.ndarray, 4]  # Δ [m, m, s, m]
+    signals: Signals  # s
+    added: Changes  # Δ
 
 
 def feedback_arrays(
@@ -66,16 +93,20 @@ def feedback_arrays(
     h, omega = robot.height_com, robot.omega
     units = np.array([h, h, 1.0 / omega, h])
     rising = sorted(falls.values(), key=lambda fall: fall.angle)
+    unit = h * omega / robot.units.moment
+    pivots = {
+        name: Pivot(float(row.momentum * unit), float(row.lean * h))
+        for name, row in (("plan", pivot.plan), ("swing", pivot.swing), ("stance", pivot.stance))
+    }
     made = FeedbackArrays.allocate(
-        {"n": len(rising)}, upright=robot_arrays(robot).root_standing[2].copy(), height=float(h),
+        {"n": len(rising)}, **pivots, signals=Signals(*named_entries(Signals)),
+        added=Changes(*named_entries(Changes)), height=float(h),
+        upright=robot_arrays(robot).root_standing[2].copy(),
         momentum_unit=float(omega / robot.units.moment), lateral_fraction=pivot.lateral_fraction,
     )  # fmt: skip
     made.always[:] = made.gains[:] = units[:, None] * always.matrix()
     for k, fall in enumerate(rising):
         made.angles[k], made.added_at[k] = np.radians(fall.angle), units[:, None] * fall.matrix()
-    unit = h * omega / robot.units.moment
-    for k, row in enumerate((pivot.plan, pivot.swing, pivot.stance)):
-        made.pivot[k] = row.momentum * unit, row.lean * h
     return made
 
 
@@ -83,7 +114,7 @@ def feedback_arrays(
 def schedule_gains(f: FeedbackArrays, ahead: float, left: float) -> None:
     """Set K to that of a step in a fall along (ahead, left)."""
     n, low, blend = f.angles.shape[0], 0, 0.0
-    first = n > 0 and f.signals[LATER_STEP] == 0.0
+    first = n > 0 and f.signals.later_step == 0.0
     if n > 1 and first:
         angle = np.arctan2(abs(left), ahead)
         while low < n - 2 and angle > f.angles[low + 1]:
@@ -111,14 +142,14 @@ def lean(f: FeedbackArrays, s: StateArrays) -> tuple[float, float]:
 
 @compiled
 def pivot_offset(
-    f: FeedbackArrays, s: StateArrays, row: int, cos: float, sin: float
+    f: FeedbackArrays, s: StateArrays, pivot: Pivot, cos: float, sin: float
 ) -> tuple[float, float]:
-    """r of a row of `pivot` [m], see `PivotConfig`; of a step along a heading."""
-    turn, tilt = f.pivot[row, 0], f.pivot[row, 1]
+    """r of one of the pivots of `f` [m], see `PivotConfig`; of a step along a heading."""
+    turn, tilt = pivot.momentum, pivot.lean
     if turn == 0.0 and tilt == 0.0:
         return 0.0, 0.0
     x, y = lean(f, s)
-    x, y = tilt * x + turn * s.momentum[LY], tilt * y - turn * s.momentum[LX]
+    x, y = tilt * x + turn * s.momentum[4], tilt * y - turn * s.momentum[3]
     ahead, left = along(cos, sin, x, y)
     return turned(cos, sin, ahead, f.lateral_fraction * left)
 
@@ -133,14 +164,14 @@ def evaluate_feedback(
     up_x, up_y = lean(f, s)
     x, y = along(cos, sin, s.capture_point[0] - stance[0], s.capture_point[1] - stance[1])
     lean_x, lean_y = along(cos, sin, up_x, up_y)
-    turn_x, turn_y = along(cos, sin, s.momentum[LY], -s.momentum[LX])  # where it turns the body to
-    signals[CONSTANT] = 1.0
-    signals[CAPTURE_AHEAD], signals[CAPTURE_OUTWARD] = x / f.height, side * y / f.height
-    signals[LEAN_AHEAD], signals[LEAN_OUTWARD] = lean_x, side * lean_y
-    signals[MOMENTUM_AHEAD] = f.momentum_unit * turn_x
-    signals[MOMENTUM_OUTWARD] = f.momentum_unit * side * turn_y
+    turn_x, turn_y = along(cos, sin, s.momentum[4], -s.momentum[3])  # where it turns the body to
+    signals.constant = 1.0
+    signals.capture_ahead, signals.capture_outward = x / f.height, side * y / f.height
+    signals.lean_ahead, signals.lean_outward = lean_x, side * lean_y
+    signals.momentum_ahead = f.momentum_unit * turn_x
+    signals.momentum_outward = f.momentum_unit * side * turn_y
     for i in range(f.gains.shape[0]):
         total = 0.0
-        for k in range(signals.shape[0]):
-            total += f.gains[i, k] * signals[k]
-        f.added[i] = total
+        for k in range(signals.values.shape[0]):
+            total += f.gains[i, k] * signals.values[k]
+        f.added.values[i] = total

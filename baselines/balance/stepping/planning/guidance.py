@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from poise.baselines.balance.references import targets
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import copy_into, rotated, rotation_error, turn_error, turned
 
 from .blocks import CaptureTick
-from .feedback import HEIGHT, STANCE, SWING, pivot_offset
+from .feedback import pivot_offset
 from .recentring import LOADING, SHIFTING, limit_cop_distance
 from .search import set_capture_point
 
@@ -20,7 +19,7 @@ UPRIGHT = 0.95  # [h] a motion that has the CoM lower crouches
 @compiled
 def crouch(t: CaptureTick) -> float:
     """How far below 0.95 h the motion has the CoM [m]; 0 where it stands."""
-    height = t.reference_in.com[2] - t.state.origin[2] - t.offsets[targets.COM_Z]
+    height = t.reference_in.com[2] - t.state.origin[2] - t.offsets.height
     return max(UPRIGHT * t.robot.height_com - height, 0.0)
 
 
@@ -54,7 +53,7 @@ def copy_reference(t: CaptureTick) -> None:
     copy_into(given.q_ref, own.q_ref)
     copy_into(given.v_ref, own.v_ref)
     copy_into(given.angular_momentum, own.angular_momentum)
-    x, y = t.offsets[targets.LEAN_X], t.offsets[targets.LEAN_Y]
+    x, y = t.offsets.lean[0], t.offsets.lean[1]
     angle = np.sqrt(x * x + y * y)
     cos, sin = np.cos(angle), np.sin(angle)
     if angle > 0.0:
@@ -94,41 +93,41 @@ def guide_com(
     for i in range(n):
         rest_x += region[i, 0] / n
         rest_y += region[i, 1] / n
-    if not t.memory.swinging[0]:
+    if not t.memory.swinging:
         rest_x += cos * g.rest_ahead
         rest_y += sin * g.rest_ahead
-    if t.recentring.stage[0] == SHIFTING:
+    if t.recentring.stage == SHIFTING:
         rest_x, rest_y = t.recentring.capture_target[0], t.recentring.capture_target[1]
-    x, y = turned(cos, sin, offsets[targets.COM_X], offsets[targets.COM_Y])
+    x, y = turned(cos, sin, offsets.com[0], offsets.com[1])
     rest_x += x
     rest_y += y
-    back = t.memory.return_fraction[0]
-    if back > 0.0 and not t.memory.recovering[0]:  # the motion is gone on with
+    back = t.memory.return_fraction
+    if back > 0.0 and not t.memory.recovering:  # the motion is gone on with
         rest_x += back * (t.reference_in.com[0] - rest_x)
         rest_y += back * (t.reference_in.com[1] - rest_y)
     desired, xi = t.vector, t.search.capture_point
     set_capture_point(t.search)
     desired[0] = xi[0] + g.gain * (xi[0] - rest_x)
     desired[1] = xi[1] + g.gain * (xi[1] - rest_y)
-    if t.recentring.stage[0] == LOADING:
+    if t.recentring.stage == LOADING:
         limit_cop_distance(t, rest_x, rest_y, desired)
     find_nearest(region, desired, p)
     over_x, over_y = desired[0] - p[0], desired[1] - p[1]
     scale = min(1.0, overreach / max(np.sqrt(over_x * over_x + over_y * over_y), 1e-9))
-    p[0] += over_x * scale + cos * offsets[targets.COP_X] - sin * offsets[targets.COP_Y]
-    p[1] += over_y * scale + sin * offsets[targets.COP_X] + cos * offsets[targets.COP_Y]
+    p[0] += over_x * scale + cos * offsets.cop[0] - sin * offsets.cop[1]
+    p[1] += over_y * scale + sin * offsets.cop[0] + cos * offsets.cop[1]
     for a in range(2):
         own.com[a], own.com_vel[a], own.cop[a] = s.com[a], s.com_vel[a], p[a]
-        own.com_acc[a] = s.omega[0] * s.omega[0] * (s.com[a] - p[a])
-    row = SWING if t.memory.swinging[0] else STANCE
-    x, y = pivot_offset(t.search.feedback, s, row, cos, sin)
-    own.com_acc[0] += s.omega[0] * s.omega[0] * x
-    own.com_acc[1] += s.omega[0] * s.omega[0] * y
+        own.com_acc[a] = s.omega * s.omega * (s.com[a] - p[a])
+    f = t.search.feedback
+    x, y = pivot_offset(f, s, f.swing if t.memory.swinging else f.stance, cos, sin)
+    own.com_acc[0] += s.omega * s.omega * x
+    own.com_acc[1] += s.omega * s.omega * y
     half = 0.25 * (stride_x * stride_x + stride_y * stride_y)
     leg_height = np.sqrt(max(g.leg_length * g.leg_length - half, 0.0))
-    own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets[targets.COM_Z]
-    if t.memory.swinging[0]:
-        own.com[2] += t.search.feedback.added[HEIGHT] - g.swing_com_drop
+    own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets.height
+    if t.memory.swinging:
+        own.com[2] += t.search.feedback.added.height - g.swing_com_drop
     own.com_vel[2] = own.com_acc[2] = 0.0
     limit_posture(t)
 
@@ -148,11 +147,11 @@ def return_to_motion(t: CaptureTick) -> None:
     """Lead height of the CoM and root to the motion's, once the robot is home and calm; guides the
     CoM to the motion's from the next tick on."""
     s, m, given, own = t.state, t.memory, t.reference_in, t.reference_out
-    if m.recovering[0]:
-        m.return_fraction[0] = 0.0
+    if m.recovering:
+        m.return_fraction = 0.0
         return
-    m.return_fraction[0] = min(m.return_fraction[0] + RETURN * s.omega[0] * t.gains.period, 1.0)
-    back = m.return_fraction[0]
+    m.return_fraction = min(m.return_fraction + RETURN * s.omega * t.gains.period, 1.0)
+    back = m.return_fraction
     own.com[2] += back * (given.com[2] - own.com[2])
     own.com_vel[2], own.com_acc[2] = back * given.com_vel[2], back * given.com_acc[2]
     axis, R = t.vector, own.root_axes
@@ -176,7 +175,7 @@ def limit_posture(t: CaptureTick) -> None:
     acceleration, L̇ = (p − c) × f, which no foothold makes good.
     """
     s, g, own, error = t.state, t.gains, t.reference_out, t.vector
-    p = t.on_both.problem.parameters
+    p = t.on_both.posture
     for j in range(own.q_ref.shape[0]):
         asked = p.stiffness[6 + j] * (own.q_ref[j] - s.qpos[7 + j]) + p.damping[6 + j] * (
             own.v_ref[j] - s.qvel[6 + j]
@@ -188,7 +187,7 @@ def limit_posture(t: CaptureTick) -> None:
         turn = R[0, a] * error[0] + R[1, a] * error[1] + R[2, a] * error[2]
         own.root_acc[a] = p.stiffness[3 + a] * turn - p.damping[3 + a] * s.qvel[3 + a]
         total += own.root_acc[a] * own.root_acc[a]
-    most = g.swing_accel if t.memory.swinging[0] else g.root_accel
+    most = g.swing_accel if t.memory.swinging else g.root_accel
     scale = min(1.0, most / max(np.sqrt(total), 1e-9)) - 1.0
     for a in range(3):
         own.root_acc[a] *= scale

@@ -15,17 +15,11 @@ from poise.envs.compiled.maths.vectors import along
 from poise.envs.robots.robot import Robot
 
 from .blocks import (
-    BEST_COST,
-    BEST_OFFSET,
-    BEST_TIME,
-    BEST_X,
-    BEST_Y,
     CaptureTick,
     Recentring,
     Search,
 )
 from .config import RecentringConfig
-from .feedback import PHASE
 from .search import (
     distance_outside,
     end_capture_point,
@@ -50,8 +44,13 @@ SLIP_TIME, SLIP_SPEED = 0.04, 0.25
 def recentring_arrays(robot: Robot, config: RecentringConfig) -> Recentring:
     """`config` for one robot."""
     feet = nominal_feet(robot)
+    numbers = in_si(
+        config, robot.units, "distance", "calm_speed", "calm_time", "capture_offset",
+        "counterbalance", "arrival_radius", "shift_time_max", "swing_time", "margin",
+        "cop_distance",
+    )  # fmt: skip
     return Recentring.allocate(
-        **in_si(Recentring, config, robot.units),
+        **numbers,
         calm_cosine=float(np.cos(np.radians(config.calm_tilt))),
         nominal=(feet[0] - feet[1])[:2].copy(),
     )
@@ -60,7 +59,7 @@ def recentring_arrays(robot: Robot, config: RecentringConfig) -> Recentring:
 @compiled
 def stop_recentring(r: Recentring) -> None:
     """Let no foot go back."""
-    r.stage[0], r.homing[0], r.timer[0] = INACTIVE, 0, 0.0
+    r.stage, r.homing, r.timer = INACTIVE, 0, 0.0
 
 
 @compiled
@@ -95,13 +94,13 @@ def shift_weight(t: CaptureTick) -> None:
         x, y = s.capture_point[0] - feet[i, 0], s.capture_point[1] - feet[i, 1]
         distances[i] = np.sqrt(x * x + y * y)
     foot = 1 if distances[0] < distances[1] else 0
-    r.stage[0], r.foot[0], r.timer[0] = SHIFTING, foot, 0.0
-    t.memory.recovering[0] = 1
+    r.stage, r.foot, r.timer = SHIFTING, foot, 0.0
+    t.memory.recovering = 1
     axes, level = s.sole_axes[1 - foot], t.memory.level_frame
     set_level_frame(level, axes[0, 0], axes[1, 0])
-    t.memory.corners[0] = 0
+    t.memory.corners = 0
     q, sign = t.search, 1.0 if foot == 0 else -1.0
-    q.foot[0], q.heading[0], q.heading[1] = foot, level[0, 0], level[1, 0]
+    q.foot, q.heading[0], q.heading[1] = foot, level[0, 0], level[1, 0]
     x, y = to_step_frame(q, feet[foot, 0], feet[foot, 1])
     nominal_x, nominal_y = sign * r.nominal[0], sign * r.nominal[1]
     scale = r.capture_offset / np.sqrt(nominal_x * nominal_x + nominal_y * nominal_y)
@@ -131,16 +130,16 @@ def recentring_step_due(t: CaptureTick) -> bool:
     s, r = t.state, t.recentring
     if r.distance == 0.0:
         return False
-    if r.stage[0] == SHIFTING:
-        r.timer[0] += t.gains.period
+    if r.stage == SHIFTING:
+        r.timer += t.gains.period
         x, y = s.capture_point[0] - r.capture_target[0], s.capture_point[1] - r.capture_target[1]
-        return np.sqrt(x * x + y * y) < r.arrival_radius or r.timer[0] > r.shift_time_max
-    r.timer[0] = r.timer[0] + t.gains.period if _is_calm(t) else 0.0
-    if r.timer[0] > r.calm_time:
+        return np.sqrt(x * x + y * y) < r.arrival_radius or r.timer > r.shift_time_max
+    r.timer = r.timer + t.gains.period if _is_calm(t) else 0.0
+    if r.timer > r.calm_time:
         if _stance_error(t) > r.distance:
             shift_weight(t)
         else:
-            t.memory.recovering[0] = 0  # as at the start: the next push meets a first step
+            t.memory.recovering = 0  # as at the start: the next push meets a first step
     return False
 
 
@@ -150,7 +149,7 @@ def limit_cop_distance(t: CaptureTick, rest_x: float, rest_y: float, p: np.ndarr
     r, xi = t.recentring, t.state.capture_point
     x, y = xi[0] - rest_x, xi[1] - rest_y
     if np.sqrt(x * x + y * y) < r.arrival_radius:
-        r.stage[0] = INACTIVE
+        r.stage = INACTIVE
         return
     x, y = p[0] - xi[0], p[1] - xi[1]
     scale = min(1.0, r.cop_distance / max(np.sqrt(x * x + y * y), 1e-9))
@@ -161,11 +160,11 @@ def limit_cop_distance(t: CaptureTick, rest_x: float, rest_y: float, p: np.ndarr
 def _find_foothold(q: Search, r: Recentring, time: float) -> None:
     """The foothold nearest to the nominal one from which ξ(T) lies between the feet, into the best
     of the search."""
-    foot, stance = q.foot[0], q.state.sole_point[1 - q.foot[0]]
+    foot, stance = q.foot, q.state.sole_point[1 - q.foot]
     sign = 1.0 if foot == 0 else -1.0
     x, y = to_heading(q, sign * r.nominal[0], sign * r.nominal[1])
     nominal_x, nominal_y = stance[0] + x, stance[1] + y
-    q.time[0] = time
+    q.time = time
     call(q.foothold_rule, q)
     capture_x, capture_y = q.foothold[0], q.foothold[1]
     end_x, end_y = end_capture_point(q)
@@ -179,31 +178,31 @@ def _find_foothold(q: Search, r: Recentring, time: float) -> None:
         outside = distance_outside(q, end_x, end_y)
         if outside < -r.margin:
             break
-    q.best[BEST_X], q.best[BEST_Y], q.best[BEST_TIME] = x, y, time
-    q.best[BEST_COST], q.best[BEST_OFFSET] = outside, 0.0
-    q.best_foot[0] = foot
+    q.best_x, q.best_y, q.best_time = x, y, time
+    q.best_cost, q.best_offset = outside, 0.0
+    q.best_foot = foot
 
 
 @compiled
 def plan_recentring(q: Search, r: Recentring) -> None:
     """The step of the foot that goes back, into the best of the search."""
     schedule_feedback(q)
-    foot = r.foot[0]
-    q.feedback.signals[PHASE] = 0.0
+    foot = r.foot
+    q.feedback.signals.phase = 0.0
     set_foot(q, foot)
     set_start(q, q.state.sole_point[foot, 0], q.state.sole_point[foot, 1])
     _find_foothold(q, r, r.swing_time)
-    r.stage[0], r.homing[0] = SWINGING, 1
+    r.stage, r.homing = SWINGING, 1
 
 
 @compiled
 def replan_recentring(q: Search, r: Recentring, w: Swing) -> bool:
     """The same in its swing; False where ξ can no longer be caught near the nominal stance."""
-    q.feedback.signals[PHASE] = w.time[0] / w.duration[0]
-    set_foot(q, r.foot[0])
+    q.feedback.signals.phase = w.time / w.duration
+    set_foot(q, r.foot)
     set_start(q, w.reference[0, 0], w.reference[0, 1])
     _find_foothold(q, r, max(time_left(w), FROZEN))
-    return q.best[BEST_COST] <= 0.0
+    return q.best_cost <= 0.0
 
 
 @compiled
@@ -216,7 +215,7 @@ def slipped_foot(t: CaptureTick) -> int:
     for foot in range(2):
         x, y = s.J_v[6 * foot], s.J_v[6 * foot + 1]
         slips = s.contacts[foot] < 0.5 or np.sqrt(x * x + y * y) > SLIP_SPEED
-        slips = slips and s.contacts[1 - foot] > 0.5 and t.memory.clock[0] > BOUNCE_TIME
+        slips = slips and s.contacts[1 - foot] > 0.5 and t.memory.clock > BOUNCE_TIME
         r.slip_time[foot] = r.slip_time[foot] + t.gains.period if slips else 0.0
         if r.slip_time[foot] > SLIP_TIME:
             return foot
@@ -227,17 +226,17 @@ def slipped_foot(t: CaptureTick) -> int:
 def lower_foot(t: CaptureTick, foot: int) -> None:
     """Begin the second half of a swing of a foot that slipped, from where and as fast as it is."""
     s, m, w = t.state, t.memory, t.swing
-    m.foot[0], m.swinging[0], m.load_fraction[0] = foot, 1, 0.0
-    t.recentring.stage[0] = INACTIVE
+    m.foot, m.swinging, m.load_fraction = foot, 1, 0.0
+    t.recentring.stage = INACTIVE
     start_swing(w, s.sole_point[foot], s.sole_point[1 - foot, 2], t.search.time_min)
     for a in range(3):
         w.reference[1, a] = s.J_v[6 * foot + a]
-    w.time[0] = max(w.lift, LANDING) * w.duration[0]
+    w.time = max(w.lift, LANDING) * w.duration
 
 
 @compiled
 def end_recentring_swing(r: Recentring) -> None:
     """Let the foot that went back take up its load, at touchdown."""
     r.slip_time[0] = r.slip_time[1] = 0.0
-    if r.stage[0] == SWINGING:
-        r.stage[0] = LOADING
+    if r.stage == SWINGING:
+        r.stage = LOADING

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.envs.compiled.block import Block, Number
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import Units
+from poise.envs.compiled.mutable import Mutable
 
 from .config import SwingTask
 from .units import in_si
@@ -16,7 +17,7 @@ LANDING = 0.6  # fraction of a swing after which contact is touchdown, not the l
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Swing(Block):
     """The reference of one swing foot's sole, replanned each tick from its own last value.
 
@@ -26,10 +27,10 @@ class Swing(Block):
 
     reference: Annotated[np.ndarray, 3, 3]  # position, velocity, acceleration [m, s]
     foothold: Annotated[np.ndarray, 2]  # [m]
-    time: Number  # since lift-off [s]
-    duration: Number  # from lift-off to touchdown [s]
-    ground: Number  # height of the ground [m]
-    time_offset: Number  # part of the duration that feedback and a policy added [s]
+    time: Mutable[float]  # since lift-off [s]
+    duration: Mutable[float]  # from lift-off to touchdown [s]
+    ground: Mutable[float]  # height of the ground [m]
+    time_offset: Mutable[float]  # part of the duration that feedback and a policy added [s]
     apex: float  # height of the way above the ground [m]
     lift: float  # fraction of the duration in which the foot rises
     landing_speed: float  # [m/s]
@@ -60,13 +61,13 @@ def start_swing(w: Swing, point: np.ndarray, ground: float, duration: float) -> 
     for a in range(3):
         w.reference[0, a], w.reference[1, a], w.reference[2, a] = point[a], 0.0, 0.0
     w.foothold[0], w.foothold[1] = point[0], point[1]
-    w.time[0], w.duration[0], w.ground[0], w.time_offset[0] = 0.0, duration, ground, 0.0
+    w.time, w.duration, w.ground, w.time_offset = 0.0, duration, ground, 0.0
 
 
 @compiled
 def time_left(w: Swing) -> float:
     """The time until touchdown is planned [s]."""
-    return max(w.duration[0] - w.time[0], 0.0)
+    return max(w.duration - w.time, 0.0)
 
 
 @compiled
@@ -74,7 +75,7 @@ def aim_swing(w: Swing, x: float, y: float, duration: float) -> None:
     """Lead to the foothold (x, y) [m] in `duration` [s]; nothing in the last `FROZEN` seconds."""
     if time_left(w) > FROZEN:
         w.foothold[0], w.foothold[1] = x, y
-        w.duration[0] = max(duration, w.time[0] + FROZEN)
+        w.duration = max(duration, w.time + FROZEN)
 
 
 @compiled
@@ -91,37 +92,37 @@ def _lead(
 def advance_over(w: Swing, apex: float, dt: float) -> None:
     """Go `dt` [s] further: up to an `apex` above the ground [m], down to it, on at the landing
     speed."""
-    rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
+    rest, now, ground, speed = time_left(w), w.reference, w.ground, w.landing_speed
     for a in range(2):
         if rest > dt:
             _lead(now, a, w.foothold[a], 0.0, rest, dt)
         else:
             now[0, a], now[1, a], now[2, a] = w.foothold[a], 0.0, 0.0
-    lift = w.lift * w.duration[0]
-    if w.time[0] + dt < lift:
-        _lead(now, 2, ground + apex, 0.0, lift - w.time[0], dt)
+    lift = w.lift * w.duration
+    if w.time + dt < lift:
+        _lead(now, 2, ground + apex, 0.0, lift - w.time, dt)
     elif rest > dt:
         _lead(now, 2, ground, -speed, rest, dt)
     else:
         now[0, 2], now[1, 2], now[2, 2] = now[0, 2] - speed * dt, -speed, 0.0
-    w.time[0] += dt
+    w.time += dt
 
 
 @compiled
 def advance_high(w: Swing, top: float, lower: float, dt: float) -> None:
     """The same over rough ground: up to a height `top` [m] at `lift`, and on at it until the
     fraction `lower`: the foot is high before it is far, and comes down where it is to land."""
-    start, now = w.time[0], w.reference
+    start, now = w.time, w.reference
     z, speed, accel = now[0, 2], now[1, 2], now[2, 2]
-    advance_over(w, top - w.ground[0], dt)
-    end = lower * w.duration[0]
-    if w.lift * w.duration[0] <= w.time[0] < end:
+    advance_over(w, top - w.ground, dt)
+    end = lower * w.duration
+    if w.lift * w.duration <= w.time < end:
         now[0, 2], now[1, 2], now[2, 2] = quintic(z, speed, accel, top, 0.0, 0.0, end - start, dt)
 
 
 def swing_at(point: np.ndarray, duration: float, task: SwingTask, units: Units) -> Swing:
     """The swing of a foot at rest at `point` (3,) [m], of `duration` [s]."""
-    numbers, apex = in_si(Swing, task, units), task.clearance * units.height
+    numbers, apex = in_si(task, units, "lift", "landing_speed"), task.clearance * units.height
     swing = Swing.allocate(**numbers, apex=apex)
     start_swing(swing, np.array(point, dtype=float), float(point[2]), float(duration))
     return swing

@@ -1,11 +1,10 @@
 """Numbers of a configuration in units of the robot, and what they are in SI units."""
 
 from dataclasses import field, fields
-from typing import Any, Literal, get_type_hints
+from typing import Any, Literal
 
 import numpy as np
 
-from poise.envs.compiled.block import Block
 from poise.envs.compiled.maths.pendulum import Units
 
 Unit = Literal["", "h", "1/h", "1/ω", "h ω", "h ω²", "ω²", "ω/(m g)", "°"]
@@ -16,15 +15,17 @@ def number(default: float, unit: Unit = "", **bounds: Any) -> float:
     return field(default=default, metadata={"unit": unit, **bounds})
 
 
-def in_si(block: type[Block], config: Any, units: Units) -> dict[str, Any]:
-    """Those numbers of a configuration that a block has under the same names, in SI units."""
+def in_si(config: Any, units: Units, *names: str) -> dict[str, Any]:
+    """Return the numbers of a configuration that are named, in SI units, by the same names.
+
+    Raises KeyError for a name that the configuration does not have.
+    """
     found: dict[str, Any] = {}
     h, omega = units.height, units.omega
-    names = {name for name, kind in get_type_hints(block).items() if kind is float}
-    for item in fields(config):
-        if item.name not in names:
-            continue
-        value = getattr(config, item.name)
+    known = {item.name: item for item in fields(config)}
+    for name in names:
+        item = known[name]
+        value = getattr(config, name)
         match item.metadata.get("unit", ""):
             case "h":
                 value = value * h
@@ -42,5 +43,5 @@ def in_si(block: type[Block], config: Any, units: Units) -> dict[str, Any]:
                 value = value * omega / units.force
             case "°":
                 value = np.radians(value)
-        found[item.name] = float(value)
+        found[name] = float(value)
     return found

@@ -10,6 +10,7 @@ import numpy as np
 
 from poise.baselines.motion.clips.skeleton import Skeleton
 from poise.configs.errors import ConfigError
+from poise.configs.problems import out_of_range
 
 LEAST, MOST = 0.2, 2.0  # [s] durations that are looked at
 
@@ -38,7 +39,7 @@ def coefficient(
         ConfigError: a duration that is not above 0.
     """
     if not duration > 0.0:
-        raise ConfigError(f"must be above 0, not {duration:g}", field="duration")
+        raise out_of_range(duration, field="duration", above=0, form="g")
     mean, change = 0.5 * (before + after), after - before
     bent = 12.0 * (gap - duration * mean) ** 2 / duration**3 + change**2 / duration
     return np.asarray(bent @ masses)

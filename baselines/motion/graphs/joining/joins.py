@@ -1,6 +1,6 @@
 """Five ways from one clip to the next are curves between postures; four of them need no robot.
 
-`insert`, `cross` and `capture` are those of Semakin's dissertation [Semakin04], made C²;
+`insert`, `cross_fade` and `capture` are those of Semakin's dissertation [Semakin04], made C²;
 `inertial` is that of games. With headings aligned, a and b the states of clip A at its cut and of B
 at its entry, D the duration, α(u) = 10u³ − 15u⁴ + 6u⁵.
 """
@@ -15,7 +15,7 @@ from poise.baselines.motion.clips.rotations import slerp
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 
-from .states import State, minus, plus, quintic, state_at, turned_rate, vector_rate
+from .states import State, minus, plus, quintic_rise, state_at, turned_rate, vector_rate
 
 SHORTEST = 2  # frames of a transition
 
@@ -65,10 +65,10 @@ def hermite_curve(a: State, b: State, duration: float, order: int = 3) -> np.nda
     later = _vector_rates(gap + ahead * end / duration, b.rate + ahead * b.acceleration)
     bend_a = duration**2 * a.acceleration
     bend_b = duration * (duration * later - end) / ahead
-    return quintic(gap, start, end, bend_a, bend_b)
+    return quintic_rise(gap, start, end, bend_a, bend_b)
 
 
-def cross(before: Clip, after: Clip, duration: float, weight: str = "smooth") -> Clip:
+def cross_fade(before: Clip, after: Clip, duration: float, weight: str = "smooth") -> Clip:
     """The end of A fades into the begin of B over `duration` [s]: lasts T_A + T_B − D.
 
     q(t) = slerp(q_A(t), q_B(t − t_b), w(t)), with w = α(u), or w = u (`weight` linear), which is
@@ -137,7 +137,7 @@ def inertial(before: Clip, after: Clip, half_life: float, *, faced: bool = True)
 #: kind → join of two clips and a duration [s]
 JOINS: dict[str, Callable[[Clip, Clip, float], Clip]] = {
     "insert": insert,
-    "cross": cross,
+    "cross": cross_fade,
     "capture": capture,
     "inertial": inertial,
 }
@@ -216,6 +216,6 @@ def _offset(
     """(n, 3 + 3J) offsets from 0, at rest, to `end` with the seam's rate and acceleration."""
     speed, rest = span * _offset_rate(end, rate, own.rate), np.zeros_like(end)
     bent = span**2 * (bend - own.acceleration)
-    c3, c4, c5 = quintic(end, rest, speed, rest, bent)[3:]
+    c3, c4, c5 = quintic_rise(end, rest, speed, rest, bent)[3:]
     s = u[:, None]
     return s**3 * (c3 + s * (c4 + s * c5))

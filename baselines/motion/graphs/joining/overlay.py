@@ -10,6 +10,7 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.link_groups import GROUPS, LinkGroup
 from poise.baselines.motion.clips.rotations import IDENTITY, inverse, multiply, slerp
 from poise.configs.errors import ConfigError
+from poise.configs.problems import out_of_range
 from poise.envs.compiled.maths.easing import ease
 
 BLEND = 0.3  # [s] in which a layer comes and goes
@@ -98,12 +99,12 @@ def _check(base: Clip, layer: Layer) -> None:
         raise ConfigError(f"{layer.clip.name!r} has another skeleton than {base.name!r}",
                           field="overlay")  # fmt: skip
     if layer.weight is not None and not 0.0 <= layer.weight <= 1.0:
-        raise ConfigError(f"must be from 0 to 1, not {layer.weight:g}", field="overlay.weight")
+        raise out_of_range(layer.weight, field="overlay.weight", least=0, most=1, form="g")
     if not 0.0 <= layer.start < base.duration:
         raise ConfigError(f"must be within the base's {base.duration:g} s, not {layer.start:g}",
                           field="overlay.start")  # fmt: skip
     if not 0.0 < layer.blend < np.inf:
-        raise ConfigError(f"must be above 0, not {layer.blend:g}", field="overlay.blend")
+        raise out_of_range(layer.blend, field="overlay.blend", above=0, form="g")
 
 
 def _check_claims(base: Clip, layers: Sequence[Layer]) -> None:

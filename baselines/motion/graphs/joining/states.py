@@ -41,7 +41,7 @@ def plus(
     return root + tangent[..., :3], multiply(rotations, exp(turns))
 
 
-def quintic(
+def quintic_rise(
     gap: np.ndarray, start: np.ndarray, end: np.ndarray, bend_a: np.ndarray, bend_b: np.ndarray
 ) -> np.ndarray:
     """(6, n) coefficients in s, lowest power first, of the curve of the fifth order from 0 at s = 0

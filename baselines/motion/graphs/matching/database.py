@@ -8,8 +8,9 @@ import numpy as np
 
 from poise.baselines.motion.clips.clip import Clip
 from poise.configs.errors import ConfigError
+from poise.configs.problems import out_of_range
 
-from .features import AHEAD, FUTURE, clip_features, groups, steady_heading
+from .features import AHEAD, FUTURE, clip_features, feature_groups, steady_heading
 from .search import NearestPoint
 
 RATE = 1.0 / 30.0  # [s] between frames
@@ -90,14 +91,14 @@ class MatchingDatabase:
 
 def _scales(raw: np.ndarray, weights: Mapping[str, float]) -> np.ndarray:
     """(n,) w/σ of every column; a group that never changes counts nothing."""
-    known = {group.name for group in groups()}
+    known = {group.name for group in feature_groups()}
     for name, weight in weights.items():
         if name not in known:
             raise ConfigError(f"no such features: {name!r}", field="weights", choices=sorted(known))
         if not 0.0 <= weight < np.inf:
-            raise ConfigError(f"must be at least 0, not {weight:g}", field=f"weights.{name}")
+            raise out_of_range(weight, field=f"weights.{name}", least=0, form="g")
     scales, begin = np.empty(raw.shape[1]), 0
-    for group in groups():
+    for group in feature_groups():
         columns = slice(begin, begin + group.size)
         deviation = float(raw[:, columns].std(axis=0).mean())
         weight = weights.get(group.name, group.weight)

@@ -33,14 +33,14 @@ GROUPS = (
 FUTURE = (Group("place", 2, 2.0), Group("direction", 2, 1.5))  # of every time ahead
 
 
-def groups(ahead: tuple[float, ...] = AHEAD) -> tuple[Group, ...]:
+def feature_groups(ahead: tuple[float, ...] = AHEAD) -> tuple[Group, ...]:
     """All groups in the order of the columns; those of the future are called ``place@0.5``."""
     return GROUPS + tuple(Group(f"{group.name}@{time:g}", group.size, group.weight)
                           for time in ahead for group in FUTURE)  # fmt: skip
 
 
 def clip_features(clip: Clip, ahead: tuple[float, ...] = AHEAD) -> np.ndarray:
-    """(F, n) features of every frame in its own facing frame, in the order of `groups`.
+    """(F, n) features of every frame in its own facing frame, in the order of `feature_groups`.
 
     The facing frame stands below the root, x along `steady_heading`. The heading ahead is the unit
     vector (cos, sin) of how far it has turned by then. Ahead of its end a clip goes on as it ends.

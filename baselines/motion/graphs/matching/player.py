@@ -18,7 +18,7 @@ NEAR = 0.2  # [s] a frame that is so near to the one that plays is no other one
 GAIN = 0.1  # by which share another frame must be nearer than the one that plays
 
 
-class Command(NamedTuple):
+class PlayerCommand(NamedTuple):
     """The commanded velocity and turn, in the heading frame."""
 
     forward: float = 0.0  # [m/s]
@@ -59,7 +59,7 @@ class Matched(NamedTuple):
 
 def match_motion(
     database: MatchingDatabase,
-    command: Callable[[float], Command],
+    command: Callable[[float], PlayerCommand],
     duration: float,
     *,
     start: tuple[int, int] = (0, 0),
@@ -93,7 +93,7 @@ def match_motion(
 
 def find_pieces(
     database: MatchingDatabase,
-    command: Callable[[float], Command],
+    command: Callable[[float], PlayerCommand],
     duration: float,
     start: tuple[int, int] = (0, 0),
 ) -> list[Piece]:

@@ -10,6 +10,7 @@ from poise.baselines.motion.clips.rotations import to_scipy
 from poise.baselines.motion.graphs.joining.states import vector_rate
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import finite_array, whole_number
+from poise.configs.problems import out_of_range
 
 from .chain import Chain
 
@@ -81,7 +82,7 @@ class IkOptions:
             whole_number(getattr(self, name), 1, name)
         for name in ("tolerance", "lever", "damping", "largest_step"):
             if not 0.0 < (value := getattr(self, name)) < np.inf:
-                raise ConfigError(f"must be above 0, not {value:g}", field=name)
+                raise out_of_range(value, field=name, above=0, form="g")
 
 
 @dataclass(frozen=True, eq=False)

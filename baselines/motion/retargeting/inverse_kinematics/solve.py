@@ -6,6 +6,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import finite_array, whole_number
+from poise.configs.problems import out_of_range
 from poise.envs.compiled.copies import Copyable
 from poise.envs.robots.robot import Robot
 
@@ -63,7 +64,7 @@ class InverseKinematics(Copyable):
             raise ConfigError(f"is over {len(prior.mean)} joints, {robot.name!r} has "
                               f"{len(robot.joint_names)}", field="prior")  # fmt: skip
         if not 0.0 <= prior_weight < np.inf:
-            raise ConfigError(f"must be at least 0, not {prior_weight:g}", field="prior_weight")
+            raise out_of_range(prior_weight, field="prior_weight", least=0, form="g")
         self.robot, self.method, self.options = robot, method, options or IkOptions()
         self.prior, self.prior_weight = prior, prior_weight
         self.names = tuple(ends)

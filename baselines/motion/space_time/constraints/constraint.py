@@ -13,7 +13,7 @@ from poise.configs.files import resolve
 from poise.configs.kinds import OfKind
 from poise.configs.schema import build, read_yaml
 
-from .scene import Rows, Scene
+from .scene import ConstraintRows, Scene
 
 PERIOD = "period"
 MOST = 100  # constraints of a file
@@ -41,7 +41,7 @@ class When:
 Period = Literal["always"] | tuple[float, float] | When
 
 
-def frames_of(period: Period, scene: Scene) -> np.ndarray:
+def period_frames(period: Period, scene: Scene) -> np.ndarray:
     """The frames (k,) of a period; ``always`` is the clip without what leads from and to standing.
 
     Raises ConfigError for a period without frames: it names the clip's times.
@@ -87,7 +87,7 @@ class Constraint(OfKind):
     """Base of constraints: a subclass is a frozen dataclass with a `kind` to be named by.
 
     Attributes:
-        period: when it holds, see `frames_of`.
+        period: when it holds, see `period_frames`.
         weight: of its violation, beside the others'.
     """
 
@@ -98,7 +98,7 @@ class Constraint(OfKind):
     period: Period = "always"
     weight: float = field(default=1.0, metadata={"above": 0.0})
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """Rows at some frames, in metres or radians; of several frames at the last of them.
 
         Raises ConfigError for a point that the robot does not have.
@@ -107,9 +107,9 @@ class Constraint(OfKind):
 
     def frames(self, scene: Scene) -> np.ndarray:
         """The frames (k,) at which it holds."""
-        return frames_of(self.period, scene)
+        return period_frames(self.period, scene)
 
-    def all_rows(self, scene: Scene) -> list[Rows]:
+    def all_rows(self, scene: Scene) -> list[ConstraintRows]:
         """Rows of its whole period."""
         return list(self.rows(scene, self.frames(scene).tolist()))
 

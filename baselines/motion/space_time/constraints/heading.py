@@ -6,11 +6,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from poise.baselines.motion.retargeting.limbs import Difference
+from poise.baselines.motion.retargeting.limbs import LimbVector
 from poise.configs.errors import ConfigError
 
 from .constraint import Constraint
-from .scene import Rows, Scene
+from .scene import ConstraintRows, Scene
 
 LINES = {"hips": "hip", "shoulders": "shoulder"}
 
@@ -33,20 +33,20 @@ class Heading(Constraint):
     of: Literal["hips", "shoulders"] = "hips"
     within: float = field(default=0.0, metadata={"min": 0.0})
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """ψ − angle [rad], one row a frame: with the line (x, y), ψ = atan2(−x, y)."""
         if f"{LINES[self.of]}_left" not in scene.limbs.points:
             raise ConfigError(f"the robot {scene.robot.name!r} has no {self.of}", field="of",
                               choices=("hips",))  # fmt: skip
         left, right = (scene.limbs.points[f"{LINES[self.of]}_{s}"] for s in ("left", "right"))
-        line, bound = Difference(left, right), np.array([np.radians(self.within)])
+        line, bound = LimbVector(left, right), np.array([np.radians(self.within)])
         for frame in frames:
             data = scene.at(frame)
             (x, y, _), moved = line.place(data), line.jacobian(scene.model, data)
             off = np.arctan2(-x, y) - np.radians(self.angle)
             off = (off + np.pi) % (2.0 * np.pi) - np.pi
             derivative = (x * moved[1:2] - y * moved[0:1]) / (x * x + y * y)
-            yield Rows({frame: derivative}, np.array([off]), -bound, bound)
+            yield ConstraintRows({frame: derivative}, np.array([off]), -bound, bound)
 
     def scale(self, scene: Scene) -> float:
         """From radians to degrees."""

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from .constraint import Constraint
-from .scene import Rows, Scene
+from .scene import ConstraintRows, Scene
 
 STILL = 1e-6  # [m] of a step without a direction
 
@@ -28,7 +28,7 @@ class Keep(Constraint):
     to: str | None = None
     within: float = field(default=0.0, metadata={"min": 0.0})
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """p − y, three rows a frame; y is the middle of its places in the whole period."""
         point, bound = scene.between(self.point, self.to), np.full(3, self.within)
         places = {f: point.place(scene.at(f)) for f in self.frames(scene).tolist()}
@@ -36,14 +36,16 @@ class Keep(Constraint):
         middle = 0.5 * (among.min(axis=0) + among.max(axis=0))
         for frame in frames:
             derivative = point.jacobian(scene.model, scene.at(frame))
-            yield Rows({frame: derivative}, places[frame] - middle, -bound, bound, shared=True)
+            yield ConstraintRows(
+                {frame: derivative}, places[frame] - middle, -bound, bound, shared=True
+            )
 
     def about(self) -> str:
         return f"keep {self.point}" + (f" to {self.to}" if self.to else "")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reach(Constraint):
+class PointReach(Constraint):
     """p = place, by coordinates.
 
     Attributes:
@@ -64,7 +66,7 @@ class Reach(Constraint):
         if all(value is None for value in self.place):
             raise ValueError("place must have a number")
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """p − place, a row for each given coordinate."""
         point = scene.between(self.point, self.to)
         given = [i for i, value in enumerate(self.place) if value is not None]
@@ -73,7 +75,9 @@ class Reach(Constraint):
         for frame in frames:
             data = scene.at(frame)
             derivative = point.jacobian(scene.model, data)[given]
-            yield Rows({frame: derivative}, point.place(data)[given] - goal, -bound, bound)
+            yield ConstraintRows(
+                {frame: derivative}, point.place(data)[given] - goal, -bound, bound
+            )
 
     def about(self) -> str:
         place = ", ".join("free" if value is None else f"{value:g}" for value in self.place)
@@ -94,7 +98,7 @@ class Apart(Constraint):
     distance: float = field(metadata={"above": 0.0})
     kind: Literal["apart"] = "apart"
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """One row a frame."""
         points = scene.between(self.point, self.to)
         low, high = np.array([self.distance]), np.array([np.inf])
@@ -104,7 +108,7 @@ class Apart(Constraint):
             length = float(np.linalg.norm(between))
             way = between / length if length > 1e-9 else np.array([0.0, 1.0, 0.0])
             derivative = way[None] @ points.jacobian(scene.model, data)
-            yield Rows({frame: derivative}, np.array([length]), low, high)
+            yield ConstraintRows({frame: derivative}, np.array([length]), low, high)
 
     def about(self) -> str:
         return f"{self.point} and {self.to} apart by {self.distance:g} m"
@@ -123,7 +127,7 @@ class OverSupport(Constraint):
     point: str = "com"
     margin: float = field(default=0.02, metadata={"min": 0.0})
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """A row for each side of the hull; none where no sole is planted."""
         point = scene.point(self.point, "point")
         for frame in frames:
@@ -135,7 +139,7 @@ class OverSupport(Constraint):
             value = sides[:, :2] @ point.place(data)[:2] + sides[:, 2]
             derivative = sides[:, :2] @ point.jacobian(scene.model, data)[:2]
             bound = np.full(len(sides), -self.margin)
-            yield Rows({frame: derivative}, value, np.full(len(sides), -np.inf), bound)
+            yield ConstraintRows({frame: derivative}, value, np.full(len(sides), -np.inf), bound)
 
     def about(self) -> str:
         return f"{self.point} over the support by {self.margin:g} m"
@@ -158,7 +162,7 @@ class Height(Constraint):
     def __post_init__(self) -> None:
         _check_bounds(self.least, self.most)
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """One row a frame."""
         point = scene.point(self.point, "point")
         low = np.array([-np.inf if self.least is None else self.least])
@@ -166,7 +170,7 @@ class Height(Constraint):
         for frame in frames:
             data = scene.at(frame)
             derivative = point.jacobian(scene.model, data)[2:]
-            yield Rows({frame: derivative}, point.place(data)[2:], low, high)
+            yield ConstraintRows({frame: derivative}, point.place(data)[2:], low, high)
 
     def about(self) -> str:
         return f"height of {self.point} {_in_words(self.least, self.most, 'm')}"
@@ -192,7 +196,7 @@ class Speed(Constraint):
     def __post_init__(self) -> None:
         _check_bounds(self.least, self.most)
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """The length of the step from the frame before [m], one row a frame."""
         point = scene.point(self.point, "point")
         low = np.array([-np.inf if self.least is None else self.least * scene.dt])
@@ -209,7 +213,7 @@ class Speed(Constraint):
                 way = np.array([1.0, 0.0, 0.0])
             parts = {f: sign * way[None] @ point.jacobian(scene.model, scene.at(f))
                      for f, sign in ((frame - 1, -1.0), (frame, 1.0))}  # fmt: skip
-            yield Rows(parts, np.array([length]), low, high)
+            yield ConstraintRows(parts, np.array([length]), low, high)
 
     def scale(self, scene: Scene) -> float:
         """From metres a frame to metres a second."""

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 
 from poise.baselines.motion.retargeting.limbs import (
-    Difference,
     Limbs,
+    LimbVector,
     Placed,
     Point,
     sole_corners,
@@ -39,7 +39,7 @@ class CentreOfMass(NamedTuple):
         return jacobian
 
 
-class Rows(NamedTuple):
+class ConstraintRows(NamedTuple):
     """k rows low ≤ f ≤ high, with the derivative of f by the postures of some frames.
 
     Attributes:
@@ -133,7 +133,7 @@ class Scene:
     def between(self, name: str, to: str | None) -> Placed:
         """The point of a name, from another one if that is named; their fields: point and to."""
         point = self.point(name, "point")
-        return point if to is None else Difference(point, self.point(to, "to"))
+        return point if to is None else LimbVector(point, self.point(to, "to"))
 
     def body(self, name: str, field: str, others: Iterable[str] = ()) -> int:
         """The body of this name; ConfigError names the choices."""

@@ -11,7 +11,7 @@ from poise.baselines.motion.retargeting.limbs import Point
 from poise.configs.errors import ConfigError
 
 from .constraint import Constraint
-from .scene import Rows, Scene
+from .scene import ConstraintRows, Scene
 
 FAR = 5.0  # [m] beyond which MuJoCo need not look
 
@@ -47,7 +47,7 @@ class Touch(Constraint):
             raise ConfigError(f"{self.body!r} is the body of {self.point}", field="body")
         return nearest, _solid(scene.model, other, "body")
 
-    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[ConstraintRows]:
         """One row a frame: the distance to the nearest geometry, below 0 where they overlap."""
         geom, others = self.geoms(scene)
         low, high = np.zeros(1), np.array([self.within])
@@ -55,7 +55,7 @@ class Touch(Constraint):
             data = scene.at(frame)
             found = [_distance(scene.model, data, geom, other) for other in others]
             distance, derivative = min(found, key=lambda each: each[0])
-            yield Rows({frame: derivative}, np.array([distance]), low, high)
+            yield ConstraintRows({frame: derivative}, np.array([distance]), low, high)
 
     def about(self) -> str:
         return f"{self.point} touches {self.body}"

@@ -15,9 +15,9 @@ from .tree import (
     Modifier,
     Overlay,
     Script,
+    ScriptTerm,
     Sequence,
     StateName,
-    Term,
 )
 
 MOST_BYTES = 1 << 16
@@ -100,7 +100,7 @@ class _Parser:
             terms.append(self.term())
         return Overlay(tuple(terms))
 
-    def term(self) -> Term:
+    def term(self) -> ScriptTerm:
         at, body = self.next.at, self.body()
         self.terms += 1
         if self.terms > MOST_TERMS:
@@ -108,7 +108,7 @@ class _Parser:
         modifiers = []
         while self.next.text in MODIFIERS and self.next.kind in ("sign", "name"):
             modifiers.append(self.modifier())
-        return Term(body, tuple(modifiers), at)
+        return ScriptTerm(body, tuple(modifiers), at)
 
     def body(self) -> ClipName | StateName | Sequence:
         token = self.next
@@ -131,9 +131,16 @@ class _Parser:
 
     def state(self) -> StateName:
         at = self.take().at
-        name = self.expect("name", "the name of a posture")
+        if self.next.kind == "string":
+            name = self.quoted().name
+        else:
+            name = self.expect("name", "the name of a posture").text
+        time = None
+        if self.next.text == "@":
+            self.take()
+            time = self.number("[")
         self.sign(">")
-        return StateName(name.text, at)
+        return StateName(name, time, at)
 
     def bracket(self) -> Sequence:
         opening = self.take()

@@ -6,7 +6,7 @@ import io
 
 from poise.configs.errors import ConfigError, shown
 
-from .tree import Arrow, ClipName, Modifier, Overlay, Script, Sequence, StateName, Term
+from .tree import Arrow, ClipName, Modifier, Overlay, Script, ScriptTerm, Sequence, StateName
 
 
 def text_of(script: Script) -> str:
@@ -31,7 +31,7 @@ def overlay_text(overlay: Overlay) -> str:
     return " | ".join(term_text(term) for term in overlay.terms)
 
 
-def term_text(term: Term) -> str:
+def term_text(term: ScriptTerm) -> str:
     """A motion and its modifiers."""
     return " ".join([body_text(term.body), *(_modifier(modifier) for modifier in term.modifiers)])
 
@@ -40,11 +40,11 @@ def arrow_text(arrow: Arrow) -> str:
     """`->`, or with what was chosen by hand."""
     if not arrow.kind:
         return "->"
-    options = [f"{name}: {number_text(value)}" for name, value in arrow.options]
+    options = [f"{name}: {shortest_number(value)}" for name, value in arrow.options]
     return f"->{{{', '.join([arrow.kind, *options])}}}"
 
 
-def number_text(value: float) -> str:
+def shortest_number(value: float) -> str:
     """The shortest text of a number that is read as the same."""
     return repr(float(value)).removesuffix(".0")
 
@@ -54,14 +54,15 @@ def body_text(body: ClipName | StateName | Sequence) -> str:
     if isinstance(body, Sequence):
         return f"({sequence_text(body)})"
     if isinstance(body, StateName):
-        return f"<{body.name}>"
+        name = body.name if body.name.isidentifier() else body_text(ClipName(body.name, True))
+        return f"<{name}>" if body.time is None else f"<{name} @ {shortest_number(body.time)}>"
     if '"' in body.name or "\n" in body.name:
         raise ConfigError(f"cannot be quoted: {shown(body.name)}", field="clip")
     return f'"{body.name}"' if body.quoted else body.name
 
 
 def _modifier(modifier: Modifier) -> str:
-    numbers = [number_text(value) for value in modifier.numbers]
+    numbers = [shortest_number(value) for value in modifier.numbers]
     if modifier.kind == "[":
         return f"[{numbers[0]}:{numbers[1]}]"
     if modifier.kind == "on":
@@ -69,7 +70,7 @@ def _modifier(modifier: Modifier) -> str:
     return " ".join([modifier.kind, *numbers])
 
 
-def plain(script: Script) -> Script:
+def without_brackets(script: Script) -> Script:
     """The script without brackets that say nothing: a sequence in a sequence, one term alone."""
     return Script(script.defines, _plain(script.sequence), script.text, script.source)
 

@@ -7,7 +7,7 @@
     overlay  = term { "|" term } ;
     term     = ( clip | state | "(" sequence ")" ) { modifier } ;
     clip     = STRING | NAME ;
-    state    = "<" NAME ">" ;
+    state    = "<" ( STRING | NAME ) [ "@" NUMBER ] ">" ;
     modifier = "*" NUMBER | "@" NUMBER | "[" NUMBER ":" NUMBER "]" | "on" NAME { "," NAME }
              | "mirrored" | "weight" NUMBER ;
     kind     = "insert" | "cross" | "capture" | "inertial" | "physical" ;
@@ -44,9 +44,10 @@ class ClipName:
 
 @dataclass(frozen=True)
 class StateName:
-    """A posture by its name: where the whole begins, or ends."""
+    """A posture: by its name, or of a clip at a time [s]."""
 
     name: str
+    time: float | None = None
     at: int = field(default=0, compare=False)
 
 
@@ -67,7 +68,7 @@ class Modifier:
 
 
 @dataclass(frozen=True)
-class Term:
+class ScriptTerm:
     """A clip, a state or a sequence in brackets, with its modifiers in order."""
 
     body: ClipName | StateName | Sequence
@@ -79,7 +80,7 @@ class Term:
 class Overlay:
     """Terms at once; the first one is the base."""
 
-    terms: tuple[Term, ...]
+    terms: tuple[ScriptTerm, ...]
 
 
 @dataclass(frozen=True)
@@ -137,12 +138,12 @@ class Script:
 
 
 def clip_names(script: Script) -> set[str]:
-    """The names of clips in a script, those that it defines among them."""
+    """The names of clips and postures in a script, those that it defines among them."""
     found: set[str] = set()
 
     def look(sequence: Sequence) -> None:
         for term in (term for overlay in sequence.overlays for term in overlay.terms):
-            if isinstance(term.body, ClipName):
+            if isinstance(term.body, ClipName | StateName):
                 found.add(term.body.name)
             elif isinstance(term.body, Sequence):
                 look(term.body)

@@ -10,7 +10,10 @@ from poise.baselines.balance.in_place.capture_point import CapturePoint, Capture
 from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.balance.in_place.lqr_lip import LQRLIP, lqr_gain
 from poise.baselines.controller import Targets
+from poise.baselines.registry import load_controller
 from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.tasks.task import TaskSpace
+from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.pendulum import lip_step
 from poise.envs.compiled.maths.polygons import half_planes
 from poise.envs.physics.simulation import Simulation
@@ -24,7 +27,7 @@ def moving(velocity, offset=(0.0, 0.0)):
     targets = Targets.standing(robot(), simulation.state)
     s.com[:2] = targets.com[:2] + offset
     s.com_vel[:2] = velocity
-    s.capture_point[:] = s.com[:2] + s.com_vel[:2] / s.omega[0]
+    s.capture_point[:] = s.com[:2] + s.com_vel[:2] / s.omega
     return simulation.state, targets
 
 
@@ -34,7 +37,8 @@ def test_the_qp_is_asked_for_the_pendulums_acceleration():
     state, targets = moving([0.2, 0.1])
     controller.torques(state, targets)
     p = controller.cop(state, targets)
-    rate = controller.qp.workspace.momentum_rate[:2]
+    ws = controller.qp.workspace
+    rate = ws.desired[ws.part(TaskSpace.FORCE)][:2]
     expected = robot().mass * state.omega**2 * (state.com[:2] - p)
     np.testing.assert_allclose(rate, expected, rtol=1e-9)
 
@@ -162,3 +166,8 @@ def test_a_reset_forgets():
             plans.append(controller.plan(state, targets))
     np.testing.assert_array_equal(plans[0], plans[2])
     np.testing.assert_array_equal(plans[1], plans[3])
+
+
+def test_a_pendulum_needs_the_com_task_whose_gains_it_takes_out():
+    with pytest.raises(ConfigError, match=r"qp.com: must be a task of kind 'com'"):
+        load_controller({"base": "lqr-lip", "qp": {"base": "momentum-qp", "com": None}}, robot())

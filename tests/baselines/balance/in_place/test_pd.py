@@ -9,7 +9,7 @@ from poise.baselines.balance.in_place.pd import (
     PDGains,
     StablePD,
     StablePDConfig,
-    holding_torques,
+    joint_holding_torques,
 )
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
@@ -53,7 +53,7 @@ def test_feedforward_is_added_within_the_limits():
     state, targets = simulation.state, Targets.standing(robot(), simulation.state)
     targets.q_ref[:], targets.v_ref[:] = state.q, state.qvel[6:]
     limit = pd.arrays.torque_limit
-    expected = np.clip(holding_torques(state)[pd.arrays.motor_dofs - 6], -limit, limit)
+    expected = np.clip(joint_holding_torques(state)[pd.arrays.motor_dofs - 6], -limit, limit)
     np.testing.assert_allclose(pd.torques(state, targets), expected, atol=1e-10)
 
 
@@ -78,7 +78,7 @@ def standing_joints(alone=(), move=None, seconds=2.0):
         torques[motors] = plain.torques(state, targets)[motors]
         state = simulation.step(torques, 2)
     assert state.com[2] - state.origin[2] > 0.7  # it stands
-    return state.q.copy(), holding_torques(state), targets.q_ref
+    return state.q.copy(), joint_holding_torques(state), targets.q_ref
 
 
 @pytest.mark.parametrize("feedforward", [False, True])

@@ -7,12 +7,20 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.references.foot_steps import FootStep, Waypoint, plan_steps
-from poise.baselines.balance.references.footwork import com_over, perform_plan, plan_zmp, real_zmp
+from poise.baselines.balance.references.footing import sole_poses
+from poise.baselines.balance.references.footwork import (
+    NotReached,
+    com_over,
+    perform_plan,
+    plan_zmp,
+    real_zmp,
+)
 from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.feasibility.check import check_motion
 from poise.configs.errors import ConfigError
+from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 from tests.support.physics import robot_named
 
@@ -70,6 +78,25 @@ def test_a_step_beyond_the_legs_is_refused() -> None:
     plan = plan_steps(steps, joints, np.zeros((120, 3)), robot, "far")
     with pytest.raises(ConfigError, match="far: feet: "):
         perform_plan(robot, plan, "far")
+
+
+def test_what_legs_lack_by_little_the_body_sinks() -> None:
+    """Only near where they lack it, without a corner, and soles are where they were to be."""
+    robot, frames = robot_named("humanoid"), 150
+    joints = np.tile(robot.standing_qpos[7:], (frames, 1))
+    steps = [FootStep("left", 1.4, 2.0, (Waypoint(1.7, up=0.1),), ahead=0.43)]
+    plan = plan_steps(steps, joints, np.zeros((frames, 3)), robot, "far")
+    low = ease(np.clip(np.minimum(np.arange(frames), np.arange(frames)[::-1]) / 30.0, 0.0, 1.0))
+    plan = plan._replace(height=plan.height * (1.0 - 0.06 * low))
+    with pytest.raises(NotReached, match=r"cannot reach at 1\.\d\d s: \d\.\d cm lack") as lacking:
+        perform_plan(robot, plan, "far")
+    assert 0.002 < lacking.value.by < 0.01
+    com, places, _ = sole_poses(robot, perform_plan(robot, plan, "far", 0.04))
+    sunk = plan.height - com[:, 2]
+    assert 0.004 < sunk.max() <= 0.04 + 1e-6 and sunk.min() > -1e-6
+    assert sunk[:30] == pytest.approx(0.0, abs=1e-6)  # before the first step
+    assert np.abs(np.diff(sunk, 2)).max() / RATE**2 < 3.0  # [m/s²]
+    assert places[plan.planted] == pytest.approx(plan.places[plan.planted], abs=2.5e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,10 @@
 """One order of what may be added to a controller's choices."""
 
 from poise.baselines.balance.references import targets as offsets
-from poise.baselines.balance.stepping.controller import StepOffsets
 from poise.baselines.environments.scales import ResidualScales, StepScales
 
 
-def test_each_index_is_where_its_name_is():
-    for k, name in enumerate(offsets.NAMES):
-        assert getattr(offsets, name.upper()) == k
+def test_each_name_is_once_in_the_order():
     assert offsets.NAMES == (*offsets.TARGETS, *offsets.STEPS)
 
 
@@ -23,11 +20,14 @@ def test_actions_scale_what_they_are_called():
 
 
 def test_step_offsets_are_read_where_they_are_written():
-    """Each property moves the entries of its name, and no others."""
-    for field in ("com", "cop", "lean", "foothold", "height", "time", "trigger"):
-        step = StepOffsets()
-        setattr(step, field, 1.0)
+    """Each part moves the entries of its name, and no others."""
+    for field, part in offsets.no_offsets().named().items():
+        if field == "values":
+            continue
+        step = offsets.no_offsets()
+        step.named()[field][:] = 1.0
+        assert part.base is not None
         moved = {name for name, value in zip(offsets.NAMES, step.values, strict=True) if value}
         pair = {f"{field}_x", f"{field}_y"}
-        assert moved == (pair if field in ("com", "cop", "lean", "foothold") else
+        assert moved == (pair if field in ("com", "cop", "lean", "momentum", "foothold") else
                          {"com_z" if field == "height" else field})  # fmt: skip

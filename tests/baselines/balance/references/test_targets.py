@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.targets import motion_arrays, update_targets
+from poise.baselines.balance.references.targets import motion_arrays, no_offsets, update_targets
 from poise.baselines.controller import Targets
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import robot_named
@@ -33,13 +33,13 @@ class Scene:
     def at(self, time, offset=0.0, **residual) -> Targets:
         """The targets with residuals by name: com=(x, y), cop=(x, y)."""
         targets = Targets.standing(self.robot, self.state)
-        values = np.zeros(RESIDUALS)
-        values[0:2] = residual.get("com", (0.0, 0.0))
-        values[2:4] = residual.get("cop", (0.0, 0.0))
+        offsets = no_offsets()
+        offsets.com[:] = residual.get("com", (0.0, 0.0))
+        offsets.cop[:] = residual.get("cop", (0.0, 0.0))
         m = self.motion
         update_targets(
             self.simulation.arrays, self.simulation.state_arrays,
-            motion_arrays(m), time, offset, values, targets.arrays(),
+            motion_arrays(m), time, offset, offsets, targets.arrays(),
         )  # fmt: skip
         return targets
 

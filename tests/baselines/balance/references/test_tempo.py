@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.references.tempo import (
-    CHANGE,
-    RATE,
-    TIME,
     Pace,
     Tempo,
     make_pace,
@@ -51,10 +48,10 @@ def test_the_rate_follows_beta_with_its_lag() -> None:
     tempo = Tempo(waits=True, distance=0.02, lag=0.1, least=0.05, after="resume")
     pace, _ = course(tempo, [0.02] * 25)
     end, way = np.exp(-1.0), (1.0 - TICK / 0.1) ** 25
-    assert pace.memory[RATE] == pytest.approx(end + (1.0 - end) * way, rel=1e-9)
-    assert course(tempo, [0.2] * 500)[0].memory[RATE] == pytest.approx(0.05, abs=1e-6)
-    assert course(tempo, [0.2] * 500, feet=0.0)[0].memory[RATE] == pytest.approx(0.0, abs=1e-6)
-    assert course(replace(tempo, lag=1e-4), [0.02])[0].memory[RATE] == pytest.approx(end)
+    assert pace.rate == pytest.approx(end + (1.0 - end) * way, rel=1e-9)
+    assert course(tempo, [0.2] * 500)[0].rate == pytest.approx(0.05, abs=1e-6)
+    assert course(tempo, [0.2] * 500, feet=0.0)[0].rate == pytest.approx(0.0, abs=1e-6)
+    assert course(replace(tempo, lag=1e-4), [0.02])[0].rate == pytest.approx(end)
 
 
 def test_rates_of_the_reference_are_those_of_its_clock() -> None:
@@ -81,13 +78,13 @@ def test_after_the_wait(after: str) -> None:
     pace, times = course(tempo, [0.0] * 250 + [0.1] * 250 + [0.0] * 2000)
     held, end = times[500] - times[250], 2500 * TICK
     assert 0.1 <= held < 0.3
-    assert pace.memory[RATE] == pytest.approx(1.0, abs=1e-3)
-    assert abs(pace.memory[CHANGE]) < 1e-2
+    assert pace.rate == pytest.approx(1.0, abs=1e-3)
+    assert abs(pace.change) < 1e-2
     if after == "catch-up":
-        assert pace.memory[TIME] == pytest.approx(end, abs=0.02)
+        assert pace.time == pytest.approx(end, abs=0.02)
         assert np.diff(times).max() < 1.26 * TICK
     elif after == "resume":
-        assert 0.6 < end - pace.memory[TIME] < 0.95
+        assert 0.6 < end - pace.time < 0.95
         assert np.diff(times).min() > 0.0
     else:
         begun = 500 + int(np.argmin(times[500:]))
@@ -98,4 +95,5 @@ def test_after_the_wait(after: str) -> None:
 def test_a_pace_begins_anew() -> None:
     pace, _ = course(Tempo(waits=True), [0.1] * 100)
     pace.clear()
-    assert pace.memory.tolist() == [0.0, 1.0, 0.0, 0.0, 0.0]
+    state = pace.time, pace.rate, pace.change, pace.clock, pace.back
+    assert state == (0.0, 1.0, 0.0, 0.0, 0)

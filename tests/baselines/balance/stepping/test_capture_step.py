@@ -7,18 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.balance.references.targets import (
-    COM_X,
-    COM_Y,
-    COM_Z,
-    COP_X,
-    COP_Y,
-    LEAN_X,
-    LEAN_Y,
-)
+from poise.baselines.balance.references.targets import Offsets, no_offsets
 from poise.baselines.balance.stepping.capture_step import CaptureStep
 from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
-from poise.baselines.balance.stepping.planning.feedback import PHASE
 from poise.baselines.balance.stepping.planning.recentring import SHIFTING
 from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.baselines.controller import WrappedController
@@ -162,7 +153,7 @@ def test_a_foot_gives_its_load_away_before_it_lifts_off():
     """While it unloads, its part of the planned force falls; then the foot is no contact."""
 
     def look(c, *_):
-        unloading = c.swing is not None and c.swing.time[0] == 0.0
+        unloading = c.swing is not None and c.swing.time == 0.0
         return c.sets.sets[0, 1].workspace.wrenches[6 * c.foot + 2] if unloading else np.nan
 
     controller = load_controller("capture-step", robot())
@@ -212,18 +203,18 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             region, overreach = planned.alone(regions, stance, feet[stance], yaw), 0.0
             ground, stride = feet[stance, 2], c.swing.foothold - feet[stance, :2]
             if left[0] > readable.FROZEN:  # the last ticks keep what was fed back
-                planner.phase = c.feedback.signals[PHASE]
+                planner.phase = c.feedback.signals.phase
                 raised[0] = planner.added(state, c.foot, yaw)[3]
             left[0] = time_left(c.swing)
         else:
-            if c.recentring.stage[0] == SHIFTING and stages[-1] != SHIFTING:
+            if c.recentring.stage == SHIFTING and stages[-1] != SHIFTING:
                 stood.clear()  # another heading from now on
             stood.append(feet.copy())
             left[0] = np.inf
             region, overreach = regions.both(stood[0], yaw), c.config.cop_overreach
             ground, stride = feet[:, 2].mean(), feet[0, :2] - feet[1, :2]
         kinds.add(c.swing is not None)
-        stages.append(int(c.recentring.stage[0]))
+        stages.append(int(c.recentring.stage))
         expected = readable.guided(c, state, targets, region, overreach, ground, stride, raised[0])
         for entry, value in expected.items():
             np.testing.assert_allclose(
@@ -231,10 +222,15 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             )
 
     offsets = controller.offsets
-    added = np.zeros(len(offsets.values))
-    added[[COM_X, COM_Y, COP_X, COP_Y, COM_Z]] = 0.02, -0.01, 0.01, 0.005, -0.01
-    added[[LEAN_X, LEAN_Y]] = 0.05, 0.08
-    monkeypatch.setattr(offsets, "clear", lambda: np.copyto(offsets.values, added))  # by the reset
+    moved = no_offsets()
+    moved.com[:], moved.cop[:], moved.height = (0.02, -0.01), (0.01, 0.005), -0.01
+    moved.lean[:] = 0.05, 0.08
+    added = moved.values
+
+    def clear(own: Offsets) -> None:
+        own.values[:] = added if own is offsets else 0.0
+
+    monkeypatch.setattr(Offsets, "clear", clear)  # which the reset calls
     watched(controller, 22.0, direction, look, duration=2.5)
     assert set(stages) == (set(range(4)) if name == "feedback-step" else {0})
     assert kinds == {True, False} and np.array_equal(offsets.values, added)

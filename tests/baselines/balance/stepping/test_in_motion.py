@@ -38,7 +38,7 @@ def test_standing_has_the_bits_of_a_controller_without() -> None:
     envs = [play(c, "standing", 1.5)
             for c in (config, replace(config, turn_limit=180.0, crouch_margin=0.0))]  # fmt: skip
     np.testing.assert_array_equal(*(env.simulation.data.qpos for env in envs))
-    assert not envs[0].controller.memory.moved[0]
+    assert not envs[0].controller.memory.moved
 
 
 def test_home_again_it_goes_on_with_the_motion() -> None:
@@ -47,8 +47,8 @@ def test_home_again_it_goes_on_with_the_motion() -> None:
     for motion in ("squat", "standing"):
         env = play("feedback-step", motion, 8.0)
         state, memory = env.simulation.state, env.controller.memory
-        assert not memory.recovering[0]
-        assert memory.return_fraction[0] == (motion == "squat")
+        assert not memory.recovering
+        assert memory.return_fraction == (motion == "squat")
         below[motion] = robot().height_com - (state.com[2] - state.origin[2])
     assert abs(below["squat"]) < 0.003
     assert below["standing"] > 0.02

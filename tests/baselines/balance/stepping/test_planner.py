@@ -11,7 +11,6 @@ from poise.baselines.balance.stepping.planning.config import (
     StepLimits,
     SwingTask,
 )
-from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.swing import swing_at
 from tests.support import planned
 from tests.support.shared import generic_state, robot
@@ -39,7 +38,7 @@ def falling(seed):
     """A generic state, its capture point up to 0.4 m away; and a heading near its own."""
     state, rng = generic_state(seed=seed).state.copy(), np.random.default_rng(seed)
     state.arrays.capture_point[:] = state.origin[:2] + rng.uniform(-0.4, 0.4, 2)
-    state.arrays.omega[0] = rng.uniform(3.0, 4.0)
+    state.arrays.omega = rng.uniform(3.0, 4.0)
     return state, state.heading_yaw + rng.uniform(-0.2, 0.2), rng
 
 
@@ -57,12 +56,12 @@ def agree(plan, expected):
 def test_plan_is_that_of_the_readable_planner(offset, feedback, falls):
     """Foot, foothold, time and cost, also where feedback and a policy move both."""
     plans, feet = planner(feedback, falls), set()
-    plans.offsets.foothold = [0.3 * offset, -0.5 * offset]
+    plans.offsets.foothold[:] = [0.3 * offset, -0.5 * offset]
     plans.offsets.time = offset
     readable = ReadablePlanner(plans)
     for seed in range(12):
         state, yaw, _ = falling(seed)
-        plans.feedback.signals[LATER_STEP] = seed % 3 == 0  # the law of first steps is another one
+        plans.feedback.signals.later_step = seed % 3 == 0  # the law of first steps is another one
         plan = planned.plan(plans, state, yaw)
         agree(plan, readable.plan(state, yaw))
         feet.add(plan.foot)
@@ -80,7 +79,7 @@ def test_a_running_step_is_planned_as_by_the_readable_planner(offset, feedback):
         state, yaw, rng = falling(seed)
         foot = seed % 2
         swing = swing_at(state.sole_points[foot], 0.35, SwingTask(), robot().units)
-        swing.time_offset[0] = offset
+        swing.time_offset = offset
         planned.aim(swing, state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
         for _ in range(rng.integers(1, 60)):
             planned.advance(swing, 0.004)

@@ -71,7 +71,7 @@ def test_within_its_limits_the_walker_is_alone_bit_for_bit(walker: str) -> None:
     ends = []
     for each, action in ((plain, standing(plain)), (env, np.ones(env.action_space.shape))):
         each.reset(seed=3, options={"push": PUSH, "command": COMMAND})
-        while each.episode.running[0]:
+        while each.episode.running:
             each.step_without_info(action)
         ends.append(np.concatenate([each.data.qpos, each.data.qvel, each.data.ctrl]))
     np.testing.assert_array_equal(*ends)
@@ -130,7 +130,7 @@ def test_its_servos_have_all_torques(walker: str) -> None:
             expected = np.clip(servos.stiffness * (target - q) - servos.damping * v, -limit, limit)
             np.testing.assert_allclose(env.data.ctrl, expected, atol=1e-9 * limit.max())
             checked += 1
-        if not env.episode.running[0]:
+        if not env.episode.running:
             break
     assert checked > 50
 
@@ -150,7 +150,7 @@ def test_once_calm_the_walker_begins_anew_with_its_command(walker: str) -> None:
     options = {"push": {**PUSH, "impulse": 9.0}, "noise": 0.0, "command": COMMAND}
     env.reset(seed=3, options=options)
     shares = [0.0]
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(standing(env))
         shares.append(env.authority)
         assert env.command is not None and env.command.ahead == COMMAND["ahead"]
@@ -171,7 +171,7 @@ def test_another_one_like_it_does_the_same(walker: str) -> None:
     ends = []
     for env in (one, other):
         env.reset(seed=3, options={"push": PUSH})
-        while env.episode.running[0]:
+        while env.episode.running:
             env.step_without_info(standing(env))
         ends.append(env.data.qpos.copy())
     np.testing.assert_array_equal(*ends)

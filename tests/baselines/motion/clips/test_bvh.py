@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.baselines.motion.clips.axes import axes_of
+from poise.baselines.motion.clips.axes import named_axes
 from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips
@@ -54,7 +54,7 @@ def test_axes_and_unit_are_found(tmp_path: Path) -> None:
     assert axes.names == ("y", "z") and axes.unit == 1.0
     assert 0.7 < clip.skeleton.leg_length < 0.75  # of the default humanoid
     check_upright(clip)
-    write_bvh(clip, tmp_path / "other.bvh", axes_of("z", "-y", 3.7))
+    write_bvh(clip, tmp_path / "other.bvh", named_axes("z", "-y", 3.7))
     other, axes = read_bvh(tmp_path / "other.bvh")
     assert axes.names == ("z", "-y")
     assert other.skeleton.leg_length == pytest.approx(0.8)
@@ -72,7 +72,7 @@ def test_axes_and_unit_of_captures_are_found() -> None:
 def test_another_frame_of_axes_is_the_same_motion(small: Path, tmp_path: Path) -> None:
     clip = read_bvh(small).clip
     path = tmp_path / "centimetres.bvh"
-    write_bvh(clip, path, axes_of("-x", "y", 0.01))
+    write_bvh(clip, path, named_axes("-x", "y", 0.01))
     again, axes = read_bvh(path)
     assert axes.names == ("-x", "y") and axes.unit == 0.01
     assert np.abs(again.places() - clip.places()).max() < 1e-7

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.motion.clips.bvh import read_bvh
-from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.baselines.motion.clips.contacts import grounded, measure_contacts
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips
 from poise.configs.files import packaged_folder
 from poise.configs.schema import read_yaml
@@ -60,3 +60,19 @@ def test_skating_and_sinking_are_measured(tmp_path: Path) -> None:
     assert contacts.skating_largest == pytest.approx(0.05, rel=1e-6)
     assert contacts.floor == pytest.approx(0.0, abs=1e-6)
     assert contacts.penetration == pytest.approx(0.003, abs=1e-6)
+
+
+def test_short_flights_are_taken_down_where_there_are_no_long_ones() -> None:
+    """The foot that lifted off last stays until the next one lands; 0.1 s are a jump."""
+    left = [1, 1, 1, 0, 0, 0, 0, 0, 1, 1]
+    right = [0, 0, 0, 0, 0, 1, 1, 1, 0, 0]
+    planted = np.array([left, right], dtype=bool).T
+    down = grounded(planted, 0.03)
+    assert down[:, 0].tolist() == [bool(x) for x in [1, 1, 1, 1, 1, 0, 0, 0, 1, 1]]
+    assert (down[:, 1] == planted[:, 1]).all()
+    assert (grounded(planted, 0.05) == planted).all()
+    first = grounded(planted[3:], 0.03)  # begins in flight: the foot that lands is down
+    assert first[:, 1].tolist() == [True] * 5 + [False] * 2
+    run = np.tile(planted[:8], (3, 1))
+    run[7::8] = False  # a flight at every step
+    assert (grounded(run, 0.02) == run).all()

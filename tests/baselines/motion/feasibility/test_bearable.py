@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from poise.baselines.motion.feasibility.split import bearable_region, motor_torques
+from poise.baselines.motion.feasibility.split import bearable_region, joint_motor_torques
 from poise.baselines.motion.feasibility.trajectory import PlantedRobot, sample_trajectory
 from poise.envs.compiled.maths.polygons import half_planes
 from tests.support.physics import robot_named
@@ -25,7 +25,7 @@ def test_corners_are_just_bearable() -> None:
     for x in (toe[0] - 0.005, toe[0] + 0.02):
         moment = -(x - path.com[0, 0]) * robot.units.force
         leaned = path._replace(wrench=path.wrench + [[0.0, 0.0, 0.0, 0.0, moment, 0.0]])
-        shares.append(np.abs(motor_torques(robot, leaned) / limit).max())
+        shares.append(np.abs(joint_motor_torques(robot, leaned) / limit).max())
     assert shares[0] < 1.0 < shares[1]
     assert toe[0] < path.support[:, 0].max() - 0.03  # the ankles give in before the soles tip
 

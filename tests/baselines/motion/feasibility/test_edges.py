@@ -6,7 +6,7 @@ import numpy as np
 
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.motion.feasibility.check import Feasibility, FeasibilityLimits, check_motion
-from poise.baselines.motion.feasibility.edges import between_clips, eased, part
+from poise.baselines.motion.feasibility.edges import between_clips, clip_limits, masked
 from tests.support.physics import robot_named
 
 
@@ -23,7 +23,7 @@ def with_margin(one: Feasibility, begin: float, end: float, margin: float) -> Fe
 def test_a_part_has_its_samples_and_its_own_limits() -> None:
     whole = judged()
     kept = (whole.times > 0.495) & (whole.times < 1.005)
-    cut = part(whole, kept, FeasibilityLimits(torque=0.1))
+    cut = masked(whole, kept, FeasibilityLimits(torque=0.1))
     assert len(cut.times) == len(cut.torque) == len(cut.zmp) == 51
     assert cut.times[0] == 0.5 and cut.limits.torque == 0.1 and not cut.feasible
     np.testing.assert_array_equal(cut.support, whole.support)
@@ -52,8 +52,8 @@ def test_a_join_may_be_as_bad_as_its_clips_beside_the_cuts_alone() -> None:
 
 def test_limits_are_never_harder_than_they_were() -> None:
     own = judged()
-    assert eased(own) == own.limits  # a possible clip changes nothing
+    assert clip_limits(own) == own.limits  # a possible clip changes nothing
     limits = FeasibilityLimits(torque=0.1, friction=1e-3, load=(1.0, 1.0))
-    softer = eased(replace(own, limits=limits))
+    softer = clip_limits(replace(own, limits=limits))
     assert softer.torque > own.torque.max() and softer.friction > own.friction.max()
     assert softer.load[0] < own.load.min() and softer.load[1] > own.load.max()

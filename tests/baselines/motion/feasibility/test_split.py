@@ -5,9 +5,9 @@ import pytest
 
 from poise.baselines.balance.references.robot_clip import reference_from
 from poise.baselines.motion.feasibility.split import (
-    motor_torques,
-    sole_cones,
+    joint_motor_torques,
     split_wrench,
+    world_cones,
     wrench_sums,
 )
 from poise.baselines.motion.feasibility.trajectory import PlantedRobot, joints_of, sample_trajectory
@@ -24,7 +24,7 @@ def test_wrenches_add_up_inside_their_cones(name: str) -> None:
     wrenches, unit = split_wrench(robot, path), robot.units.force
     total = np.einsum("kij,kj->ki", wrench_sums(path), wrenches)
     np.testing.assert_allclose(total, path.wrench, atol=1e-3 * unit)
-    rows = np.einsum("kij,kj->ki", sole_cones(robot, path), wrenches)
+    rows = np.einsum("kij,kj->ki", world_cones(robot, path), wrenches)
     assert rows.max() < 1e-9 * unit
     assert np.ptp(wrenches[:, 2]) > 0.2 * unit  # the load goes from sole to sole
 
@@ -37,9 +37,11 @@ def test_torques_are_those_of_inverse_dynamics() -> None:
     path = sample_trajectory(planted, lambda _: (q, still, still), np.zeros(1))
     forces = planted.state.h - path.jacobians[0].T @ split_wrench(robot, path)[0]
     assert np.abs(forces[:6]).max() < 0.2  # [N, N·m] on a root that nothing else holds
-    np.testing.assert_allclose(motor_torques(robot, path)[0], forces[robot.motor_dofs], atol=1e-9)
+    np.testing.assert_allclose(
+        joint_motor_torques(robot, path)[0], forces[robot.motor_dofs], atol=1e-9
+    )
     left, right = (robot.motor_names.index(f"{side}_knee") for side in ("left", "right"))
-    torques = motor_torques(robot, path)[0]
+    torques = joint_motor_torques(robot, path)[0]
     assert torques[left] == pytest.approx(torques[right], abs=1.0) and abs(torques[left]) > 1.0
 
 

@@ -22,7 +22,7 @@ def play(controller: str, motion: str, seconds: float, push: dict | None = None,
     while env.simulation.time < seconds - 1e-9 and not env.fallen:
         env.step(action)
         performance = getattr(env.controller, "performance", None)
-        left |= performance is not None and not performance.performing[0]
+        left |= performance is not None and not performance.performing
     return env, left
 
 
@@ -47,7 +47,7 @@ def test_a_push_on_one_foot_is_caught_and_the_motion_gone_on_with() -> None:
     controller = env.controller
     assert isinstance(controller, MotionStep) and controller.performance is not None
     assert left and not env.fallen and controller.steps > 1
-    assert controller.performance.performing[0] == 1
+    assert controller.performance.performing == 1
     assert abs(env.simulation.state.com_vel).max() < 0.05
 
 

@@ -19,7 +19,7 @@ from poise.baselines.balance.references.robot_clip import (
     reference_from,
     write_robot_clip,
 )
-from poise.baselines.motion.clips.axes import axes_of
+from poise.baselines.motion.clips.axes import named_axes
 from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
@@ -39,7 +39,7 @@ def written(name: str) -> tuple[Clip, np.ndarray]:
     clip, truth = make(name)
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}.bvh"
-        write_bvh(clip, path, axes_of("y", "z", UNITS[len(name) % 3]))
+        write_bvh(clip, path, named_axes("y", "z", UNITS[len(name) % 3]))
         return read_bvh(path).clip, truth
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from poise.baselines.balance.references.robot_clip import reference_from
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.baselines.motion.clips.contacts import longest_flight, measure_contacts
+from poise.baselines.motion.retargeting import leaps, paces
 from poise.baselines.motion.retargeting.paces import find_paces
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
@@ -60,6 +61,32 @@ def test_made_clips_become_motions_with_their_steps(name: str, stride: float, tu
     assert end.com[0, :2] - footing.sample(0.0).com[0, :2] == pytest.approx(way, abs=0.25)
     for foot, lift, land in swings(footing):
         assert footing.sample(0.5 * (lift + land)).places[foot, 0, 2] > 0.03
+
+
+def test_a_flight_of_less_than_a_tenth_of_a_second_is_stepped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As in dances: at some steps the other foot leaves 0.08 s before one lands, which then lands
+    when it did."""
+    clip = make("backwards")[0]
+    contacts, before = measure_contacts(clip), find_paces(clip)
+    planted, early = contacts.planted.copy(), round(0.08 / clip.dt)
+    for pace in before[1:-1:3]:
+        land, other = round(pace.land / clip.dt), 1 - pace.foot
+        lift = land + int(np.argmin(contacts.planted[land:, other]))
+        planted[land - early : lift, other] = False
+    assert 0.0 < longest_flight(planted, clip.dt)[1] < 0.1
+    for module in (paces, leaps):
+        monkeypatch.setattr(
+            module, "measure_contacts", lambda _: contacts._replace(planted=planted)
+        )
+    assert leaps.find_leaps(clip) == []
+    after = find_paces(clip)
+    assert [p.foot for p in after] == [p.foot for p in before]
+    assert [p.land for p in after] == pytest.approx([p.land for p in before], abs=0.08)
+    planted[land - round(0.12 / clip.dt) : land, other] = False
+    with pytest.raises(ConfigError, match="both feet are off the ground for 0.1"):
+        find_paces(clip)
 
 
 def test_flights_and_whole_turns_are_refused() -> None:

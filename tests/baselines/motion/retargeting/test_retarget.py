@@ -12,7 +12,7 @@ from poise.baselines.balance.references.robot_clip import reference_from
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.retargeting.limbs import Difference, find_limbs
+from poise.baselines.motion.retargeting.limbs import LimbVector, find_limbs
 from poise.baselines.motion.retargeting.retarget import Retargeted, retarget
 from poise.baselines.motion.retargeting.targets import (
     BodyTargets,
@@ -124,7 +124,7 @@ def test_jacobians_are_the_derivatives_of_the_errors(kind: str, squat: Clip) -> 
     robot = robot_named("humanoid")
     limbs = find_limbs(robot)
     targets = clip_targets(squat, arms=True, smooth=3.0)
-    task = PointTask(Difference(limbs.points["pelvis"], limbs.points["feet"]), 1.0, axes=[2])
+    task = PointTask(LimbVector(limbs.points["pelvis"], limbs.points["feet"]), 1.0, axes=[2])
     if kind == "segments":
         task = SegmentTask(limbs, list(targets.directions))
         task.aim(targets.directions, 5)

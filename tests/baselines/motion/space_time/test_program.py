@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from poise.baselines.motion.space_time.constraints.scene import Rows
+from poise.baselines.motion.space_time.constraints.scene import ConstraintRows
 from poise.baselines.motion.space_time.program import Penalised, Quadratic, solve_program
 
 CLOSE = 2e-3  # of what OSQP's tolerance of 1e-4 leaves
@@ -18,7 +18,9 @@ def cost(goal: np.ndarray) -> Quadratic:
 
 
 def at_most(frame: int, value: float, weight: float) -> Penalised:
-    rows = Rows({frame: np.ones((1, 1))}, np.zeros(1), np.array([-np.inf]), np.array([value]))
+    rows = ConstraintRows(
+        {frame: np.ones((1, 1))}, np.zeros(1), np.array([-np.inf]), np.array([value])
+    )
     return Penalised(rows, weight)
 
 
@@ -46,15 +48,17 @@ def test_rows_of_a_group_share_a_place() -> None:
     """δ₀ = δ₁ = δ₂ = y at the mean of the goals; the values that they begin with count."""
     goal, begun = np.array([0.0, 0.3, 0.9]), np.array([0.0, 0.1, -0.1])
     zero = np.zeros(1)
-    rows = [Penalised(Rows({f: np.ones((1, 1))}, begun[f : f + 1], zero, zero, True), 50.0, 4)
-            for f in range(3)]  # fmt: skip
+    rows = []
+    for f in range(3):
+        group = ConstraintRows({f: np.ones((1, 1))}, begun[f : f + 1], zero, zero, True)
+        rows.append(Penalised(group, 50.0, 4))
     place = solve(goal, rows) + begun
     assert place == pytest.approx(np.full(3, np.mean(goal + begun)), abs=CLOSE)
 
 
 def test_rows_of_two_frames() -> None:
     """|δ₁ − δ₀| ≤ 0.2 takes as much from either."""
-    rows = Rows({0: -np.ones((1, 1)), 1: np.ones((1, 1))}, np.zeros(1), np.array([-0.2]),
+    rows = ConstraintRows({0: -np.ones((1, 1)), 1: np.ones((1, 1))}, np.zeros(1), np.array([-0.2]),
                 np.array([0.2]))  # fmt: skip
     found = solve(np.array([0.0, 1.0]), [Penalised(rows, 50.0)])
     assert found == pytest.approx([0.4, 0.6], abs=CLOSE)

@@ -12,15 +12,16 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.space_time.constraints.constraint import Constraint, When
-from poise.baselines.motion.space_time.constraints.points import Height, Keep, Reach
+from poise.baselines.motion.space_time.constraints.points import Height, Keep, PointReach
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, Solver, retarget_clip
 from poise.configs.errors import ConfigError
 from tests.support.captured import captured
 from tests.support.physics import robot_named
+from tests.support.refused import refused
 
 LEAD = 0.3
 WANTED: tuple[Constraint, ...] = (
-    Reach(point="hand_right", place=(0.3, 0.2, 1.3), period=When(at=0.3)),
+    PointReach(point="hand_right", place=(0.3, 0.2, 1.3), period=When(at=0.3)),
     Keep(point="hand_left", period=(0.1, 0.5)),
 )
 
@@ -87,5 +88,5 @@ def test_bad_arguments() -> None:
     many = [Height(point="pelvis", least=0.1)] * 10
     with pytest.raises(ConfigError, match="at most 9 constraints can hold at one time, not 10"):
         retarget_clip(clip(), robot, solver="grid", constraints=many, lead=LEAD)
-    with pytest.raises(ConfigError, match="constraints: no such name: 'nothing'"):
+    with refused("unknown name", "constraints", value="'nothing'"):
         retarget_clip(clip(), robot, constraints="nothing")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.motion.space_time.constraints.scene import Scene
-from poise.baselines.motion.space_time.stance import motions, plant, sole_error
+from poise.baselines.motion.space_time.stance import motions, move_soles, sole_error
 from tests.support.scenes import swaying
 
 
@@ -35,6 +35,6 @@ def test_soles_are_led_back() -> None:
     joints = scene.qpos[:, 7:].copy()
     frames = np.arange(3, len(scene))
     assert max(error_of(scene, f) for f in frames) > 0.03
-    plant(scene, frames)
+    move_soles(scene, frames)
     assert max(error_of(scene, f) for f in frames) < 1e-9
     assert np.abs(scene.qpos[:, 7:] - joints).max() < 0.2  # nearby

@@ -29,4 +29,4 @@ def test_damage_ends_in_a_motion_or_in_one_line(play) -> None:
 @pytest.mark.parametrize("text", SCRIPTS)
 def test_undamaged_they_are_taken(text: str) -> None:
     made, record = Synthesis(graph(), clips()).make(parse(text))
-    assert made.duration > 5.0 and record["played"]
+    assert made.duration > 5.0 and record["parts"]

@@ -55,10 +55,10 @@ def test_clips_left_and_entered_in_motion_are_joined_by_what_is_possible(
 ) -> None:
     """No torque, ZMP or joint of the join is out of bounds in the motion that is performed."""
     clip, record = synthesis.make(parse(f"squat[0:0.8] {arrow} arm_swing[0.9:2.1]"))
-    first, join, second, back = record["played"]
+    first, join, second, back = record["parts"]
     made = robot_clip_of(clip, robot, "made")
     assert made.duration == pytest.approx(record["duration"]) == pytest.approx(back["ends"])
-    for before, after in pairwise(record["played"]):
+    for before, after in pairwise(record["parts"]):
         assert before["ends"] == pytest.approx(after["begins"])
     assert join["what"] == back["what"] == "physical" and not join["physics"]["through_standing"]
     assert join["ends"] - join["begins"] == pytest.approx(sum(join["physics"]["durations"]))
@@ -74,7 +74,7 @@ def test_clips_left_and_entered_in_motion_are_joined_by_what_is_possible(
 
 def test_a_motion_from_standing_to_standing_is_led_nowhere(synthesis: Synthesis) -> None:
     _, record = synthesis.make(parse("squat"))
-    assert [part["what"] for part in record["played"]] == ["squat"]
+    assert [part["what"] for part in record["parts"]] == ["squat"]
 
 
 def turned(robot: Robot) -> dict[str, Clip]:
@@ -110,7 +110,7 @@ def test_where_there_is_no_direct_way_it_goes_by_standing(robot: Robot) -> None:
     waist = robot.joint_names.index("abdomen_z")
     synthesis = synthesis_within(robot, FeasibilityLimits(speed=0.36))
     clip, record = synthesis.make(parse("left -> right"))
-    join = next(part for part in record["played"] if part["what"] == "physical"
+    join = next(part for part in record["parts"] if part["what"] == "physical"
                 and part["coefficient"] is not None)  # fmt: skip
     assert join["physics"]["through_standing"] and len(join["physics"]["durations"]) == 2
     middle = robot_qpos(clip, robot)[round((join["begins"] + join["ends"]) / 2.0 / clip.dt)]

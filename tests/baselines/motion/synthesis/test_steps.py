@@ -53,7 +53,7 @@ def test_a_script_goes_on_from_the_new_stance(robot: Robot, synthesis: Synthesis
     """Two steps ahead, each 0.1 h; the ZMP is inside the planted soles all along."""
     text = "ahead[0.4:3.8] -> swing[0.5:2.1] -> ahead[0.6:4.3] mirrored"
     clip, record = synthesis.make(parse(text))
-    joins = [part for part in record["played"] if part["what"] == "physical"]
+    joins = [part for part in record["parts"] if part["what"] == "physical"]
     assert len(joins) == 3  # one leads from standing
     assert clip.support is not None and len(clip.support.home) == len(clip)
     made = robot_clip_of(clip, robot, "made")

@@ -44,14 +44,14 @@ def make(text: str, **settings) -> tuple[Clip, dict[str, Any]]:
 
 
 def wanted(record: dict[str, Any]) -> list[str]:
-    return [part["what"] for part in record["played"] if part["wanted"]]
+    return [part["what"] for part in record["parts"] if part["wanted"]]
 
 
 def test_clips_are_played_in_order_and_the_record_says_when() -> None:
     """Each part of the whole is the clip that the record names there, but for place and heading."""
     made, record = make("squat -> punch")
     assert wanted(record) == ["humanoid_squat", "humanoid_punch"]
-    played = record["played"]
+    played = record["parts"]
     assert played[0]["begins"] == 0.0 and played[-1]["ends"] == pytest.approx(made.duration)
     for before, after in pairwise(played):
         assert after["begins"] == pytest.approx(before["ends"])
@@ -86,9 +86,9 @@ def test_transitions_by_hand_are_those_of_the_joins() -> None:
         made, record = make(f"squat ->{{{kind}, 0.5}} punch")
         own = JOINS[kind](a, b, 0.5)
         assert np.array_equal(made.rotations, own.rotations)
-        assert [part["what"] for part in record["played"]] == [a.name, kind, b.name]
+        assert [part["what"] for part in record["parts"]] == [a.name, kind, b.name]
     made, record = make("squat ->{insert} punch -> stand", kind="inertial")
-    kinds = [part["what"] for part in record["played"] if part["coefficient"] is not None]
+    kinds = [part["what"] for part in record["parts"] if part["coefficient"] is not None]
     assert kinds[0] == "insert" and set(kinds[1:]) == {"inertial"}
 
 
@@ -147,6 +147,30 @@ def test_start_and_goal_are_postures() -> None:
     assert np.degrees(np.sqrt((gap**2).mean())) < 12.0 and wanted(record) == ["humanoid_punch"]
 
 
+def rests(made: Clip, record: dict[str, Any]) -> list[np.ndarray]:
+    """Rotations of the frames in the middle of each posture that was wanted."""
+    held = [part for part in record["played"] if part["wanted"] and part["what"].startswith("<")]
+    middle = [round(0.5 * (part["begins"] + part["ends"]) / made.dt) for part in held]
+    return [made.rotations[frame, 1:] for frame in middle]
+
+
+def test_postures_in_the_middle_are_met() -> None:
+    """Exactly, at rest, in their order; motions are found between, also clips that nobody named."""
+    texts = ["<upright>", "<squat @ 1.8>", "<punch @ 2>", "<upright>"]
+    frames = [("stand", 15), ("squat", 54), ("punch", 60), ("stand", 15)]
+    asked = [clips()[f"humanoid_{name}"].rotations[i, 1:] for name, i in frames]
+    made, record = make(" -> ".join(texts))  # of postures alone the first and last are met, too
+    assert wanted(record) == texts
+    for met, posture in zip(rests(made, record), asked, strict=True):
+        assert angle_between(met, posture).max() < 1e-6
+    made, record = make("squat -> <punch @ 2> -> squat")
+    assert wanted(record) == ["humanoid_squat", "<punch @ 2>", "humanoid_squat"]
+    assert angle_between(rests(made, record)[0], asked[2]).max() < 1e-6
+    steps = angle_between(made.rotations[:-1], made.rotations[1:]).max()
+    own = max(angle_between(c.rotations[:-1], c.rotations[1:]).max() for c in clips().values())
+    assert steps < 1.5 * own  # no leap where a posture is met
+
+
 def test_nearest_frames() -> None:
     frames = {name: frames_of(clip)._replace(name=name) for name, clip in clips().items()}
     squat = frames["humanoid_squat"]
@@ -178,15 +202,15 @@ def test_nearest_frames() -> None:
             "squat | punch | reach_up",
             "line 1, column 9: 'humanoid_punch' and 'humanoid_reach_up' both",
         ),
-        ("squat -> <upright> -> punch", "line 1, column 10: a posture stands first or last, alone"),
-        ("<upright> | squat", "line 1, column 1: a posture stands first or last, alone"),
-        ("<upright> -> <upright>", "line 1, column 1: a script needs a motion, not postures alone"),
-        ("<upright>", "line 1, column 1: a script needs a motion, not postures alone"),
+        ("<upright> | squat", "line 1, column 1: a posture stands alone"),
+        ("<upright>", "line 1, column 1: a script needs a motion or two postures"),
+        ("squat -> <squat @ 99> -> punch", "line 1, column 10: 'humanoid_squat' lasts 3.60 s"),
+        ("squat -> <upright @ 1> -> punch", "no posture 'upright' (choices: humanoid_stand"),
         (
             "<sitting> -> squat",
             "no posture 'sitting' (choices: upright, humanoid_",
         ),
-        ("<upright> ->{cross} squat", "line 1, column 11: next to a posture no transition is"),
+        ("<upright> ->{cross} squat", "line 1, column 11: next to a first or last posture no"),
         ("squat ->{physical} punch", "line 1, column 7: no transition 'physical' here (choices: "),
         ("squat ->{cross, 60} punch", "cross: lasts 60 s, longer than a clip"),
         ("squat -> ((walk * 90) * 90) * 90", ": more than 1000 actions"),

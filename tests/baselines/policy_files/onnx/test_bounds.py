@@ -12,7 +12,7 @@ import pytest
 
 from poise.baselines.policy_files.networks import OnnxNetwork
 from poise.baselines.policy_files.onnx import bounds
-from poise.baselines.policy_files.onnx.bounds import Clocked, try_network
+from poise.baselines.policy_files.onnx.bounds import RunOptions, try_network
 from poise.baselines.policy_files.onnx.files import digest
 from poise.baselines.policy_files.onnx.tensors import DEPTH, external_files
 from poise.configs.errors import ConfigError, PoiseError
@@ -100,7 +100,7 @@ def test_a_network_that_takes_long_later_ends_with_an_error(
     with pytest.raises(PoiseError, match=r"policy.onnx: cannot be asked \(") as caught:
         network.act({"": np.ones(3)})
     assert time.monotonic() - begun < 20.0 and str(caught.value).isprintable()
-    with Clocked().run() as options:
+    with RunOptions().run() as options:
         assert not options.terminate
 
 

@@ -11,7 +11,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.arms import arm_scales, largest_swing
 from poise.baselines.walking.planner.command import GaitCommand, command_of
-from poise.baselines.walking.planner.reach import COMMANDED, least_width, shared_reach
+from poise.baselines.walking.planner.reach import COMMANDED, shared_reach, touching_width
 from poise.configs.errors import ConfigError
 from tests.support.shared import robot
 
@@ -91,12 +91,12 @@ def test_no_arm_swing_is_the_walk_as_it_was_bit_for_bit():
     """Zero or None; and the weights of the posture are as before when it is taken back."""
     ends = [Played((3.0, GaitCommand(0.5, arm_swing=swing))).env for swing in (None, 0.0)]
     np.testing.assert_array_equal(*(env.simulation.data.qpos for env in ends))
-    weight = ends[0].controller.gait_sets.parameters.accel_weight.copy()
+    weight = ends[0].controller.gait_sets.posture.weight.copy()
     env = Played((1.5, GaitCommand(0.5, arm_swing=0.4))).env
-    assert np.any(env.controller.gait_sets.parameters.accel_weight != weight)
+    assert np.any(env.controller.gait_sets.posture.weight != weight)
     env.command = GaitCommand(0.5)
     env.step(np.zeros(len(env.action_names)))
-    np.testing.assert_array_equal(env.controller.gait_sets.parameters.accel_weight, weight)
+    np.testing.assert_array_equal(env.controller.gait_sets.posture.weight, weight)
 
 
 def test_a_step_length_is_commanded():
@@ -114,7 +114,7 @@ def test_steps_that_last_longer_than_the_planner_lets_them_by_itself_stay_as_lon
     assert not env.fallen and own < 0.57
     both = found.down.all(axis=1)[found.last(4.0)]
     assert np.abs(found.ahead(4.0))[both].mean() == pytest.approx(0.5, abs=0.04)
-    assert env.controller._swing.duration[0] > own + 0.01
+    assert env.controller._swing.duration > own + 0.01
 
 
 @pytest.mark.parametrize("width", [0.12, 0.28])
@@ -212,7 +212,7 @@ def test_every_packaged_robot_says_what_swings_its_arms(name):
     found = Played((0.04, GaitCommand()), name=name)
     for foot, sign in enumerate((1.0, -1.0)):
         assert _hand_ahead(found.env, scales[foot]) < -0.02, (name, foot, sign)
-    assert 0.0 < least_width(body) < 0.3 * body.height_com
+    assert 0.0 < touching_width(body) < 0.3 * body.height_com
 
 
 def _hand_ahead(env, scales):

@@ -110,7 +110,8 @@ def test_the_compiled_problem_has_the_same_solution(root):
         if k % 25 != 3:
             continue
         points = [contact.rows(state) for contact in qp.contacts.values()]
-        readable = build(state, targets, qp.parameters, qp.workspace.cop_vel, points=points)
+        tasks, cop_vel = qp.tasks.values(), qp.workspace.cop_vel
+        readable = build(state, targets, qp.parameters, tasks, cop_vel, points=points)
         solution = make_solver("daqp").solve(readable)
         assert solution.solved
         vdot, w, _ = unknowns(state, solution.x, points)
@@ -145,7 +146,7 @@ def test_the_force_that_is_wanted_has_a_limit():
     _, state, targets, _ = after(qp, 0.1)
     weight = state.mass * state.robot.gravity
     assert NORMAL @ qp.forces["hand"] == pytest.approx(0.05 * weight, rel=1e-6)
-    qp.contacts["hand"].block.largest[0] = 0.02 * weight
+    qp.contacts["hand"].block.largest = 0.02 * weight
     qp.torques(state, targets)
     assert NORMAL @ qp.forces["hand"] == pytest.approx(0.02 * weight, rel=1e-6)
 
@@ -209,8 +210,8 @@ def test_controllers_that_step_have_contacts_in_every_contact_set(soles):
     points = [contact.rows(state) for contact in sets.contacts.values()]
     _, ws = contact_sets.tick(sets, state, targets, soles)
     chosen, restricted = sets.sets[soles], contact_sets.restricted(sets, state, targets, soles)
-    cop_vel = chosen.workspace.cop_vel
-    readable = build(restricted, targets, chosen.parameters, cop_vel, points=points)
+    tasks, cop_vel = sets.tasks.values(), chosen.workspace.cop_vel
+    readable = build(restricted, targets, chosen.parameters, tasks, cop_vel, points=points)
     solution = make_solver("daqp").solve(readable)
     assert solution.solved and sets.failures == 0
     vdot, w, _ = unknowns(restricted, solution.x, points)

@@ -51,7 +51,7 @@ def test_the_compiled_problem_has_the_same_solution_and_keeps_the_limit(kind):
         torques = qp.torques(state, targets)
         assert qp.failures == 0
         solution = make_solver("daqp").solve(
-            build(state, targets, qp.parameters, limits=qp.limits.values())
+            build(state, targets, qp.parameters, qp.tasks.values(), limits=qp.limits.values())
         )
         assert solution.solved
         found = torques_of(state, solution.x)[state.robot.motor_dofs - 6]
@@ -138,8 +138,11 @@ def test_without_joint_limits_no_joint_is_stopped():
     np.testing.assert_array_equal(free.u[:-nj], bounded.u[:-nj])
     assert np.isfinite(bounded.u[-nj:]).any() and not np.isfinite(free.u[-nj:]).any()
     assert np.isfinite(bounded.l[-nj:]).any() and not np.isfinite(free.l[-nj:]).any()
-    readable = build(tick.state, tick.targets, without.parameters)
-    assert len(readable.l) == len(build(tick.state, tick.targets, with_limits.parameters).l) - nj
+    rows = [
+        len(build(tick.state, tick.targets, qp.parameters, tick.tasks).l)
+        for qp in (without, with_limits)
+    ]
+    assert rows[0] == rows[1] - nj
 
 
 def test_a_problem_that_limits_make_impossible_is_solved_without_them():

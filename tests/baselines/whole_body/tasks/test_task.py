@@ -17,7 +17,7 @@ from poise.configs.schema import build as build_config
 from poise.configs.schema import to_dict
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import random_state, recovery, robot_named
-from tests.support.tasks import EXAMPLES, described, filled
+from tests.support.tasks import EXAMPLES, described, filled, given
 
 
 class FromPython(Orientation):
@@ -43,8 +43,9 @@ def flying(seed):
 
 
 def test_every_kind_has_an_example():
-    """A new task is looked at by all tests of this file."""
-    assert set(EXAMPLES) == set(Task.kinds())
+    """A new task is looked at by all tests of this file; the standard ones in test_objective.py."""
+    standard = {task.kind for task in MomentumQPConfig(root="soft").objective().values()}
+    assert {*EXAMPLES, *standard} == set(Task.kinds())
 
 
 @pytest.mark.parametrize(
@@ -56,7 +57,7 @@ def test_the_kernel_fills_the_rows_that_NumPy_has(kind, frame):
     task = bound(kind, frame=frame)
     for seed in range(4):
         state = flying(seed)
-        for ours, theirs in zip(filled(task, state), task.rows(state), strict=True):
+        for ours, theirs in zip(filled(task, state), task.rows(given(state)), strict=True):
             assert np.abs(theirs).max() > 0.0
             scale = max(np.abs(theirs).max(), 1.0)
             np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-9 * scale)
@@ -73,10 +74,10 @@ def test_without_gains_the_rows_ask_for_no_acceleration(fields):
         qpos = state.qpos.copy()
         mujoco.mj_integratePos(robot_named("humanoid").model, qpos, state.qvel, sign * h)
         other = Simulation(robot_named("humanoid")).reset(qpos, state.qvel)
-        change.append(task.rows(other).A @ state.qvel)
+        change.append(task.rows(given(other)).A @ state.qvel)
     expected = -(change[1] - change[0]) / (2 * h)
     assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(task.rows(state).b, expected, atol=1e-5)
+    np.testing.assert_allclose(task.rows(given(state)).b, expected, atol=1e-5)
 
 
 def test_the_compiled_problem_with_tasks_has_the_same_solution():
@@ -88,8 +89,7 @@ def test_the_compiled_problem_with_tasks_has_the_same_solution():
         state, targets = tick.state, tick.targets
         qp.reset()
         torques = qp.torques(state, targets)
-        rows = [task.rows(state) for task in qp.tasks.values()]
-        readable = build(state, targets, qp.parameters, tasks=rows)
+        readable = build(state, targets, qp.parameters, qp.tasks.values())
         solution = make_solver("daqp").solve(readable)
         assert solution.solved
         found = torques_of(state, solution.x)[state.robot.motor_dofs - 6]
@@ -122,7 +122,7 @@ def test_a_task_without_weight_changes_no_bit(kind):
     default = MomentumQP(robot, controller_config("momentum-qp"))
     np.testing.assert_array_equal(found[0][0], default.torques(tick.state, tick.targets))
     heavy = found[1][1]
-    rows = heavy.tasks[kind].rows(tick.state)
+    rows = heavy.tasks[kind].rows(given(tick.state))
     before = np.abs(rows.A @ default.vdot - rows.b).max()
     assert np.abs(rows.A @ heavy.vdot - rows.b).max() < 0.3 * before
 

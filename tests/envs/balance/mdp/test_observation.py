@@ -247,7 +247,7 @@ def test_measurements_are_late_and_what_is_believed_is_not():
     rng = np.random.default_rng(1)
     for _ in range(5):
         env.step(rng.uniform(-0.2, 0.2, env.action_space.shape))
-        now = (rows.next[0] - 1) % len(rows.q)
+        now = (rows.next - 1) % len(rows.q)
         np.testing.assert_array_equal(rows.q[now], data.qpos[7:])
         then = rows.q[now - 4], rows.dq[now - 4], rows.gyro[now - 4], rows.attitude[now - 4]
         steps.append(np.abs(then[1] - data.qvel[6:]).max())
@@ -265,7 +265,7 @@ def test_measurements_are_as_noisy_as_sensors():
     errors, nj, rings = [], len(robot().joint_names), env.state_source.sensors.rings
     for _ in range(10):
         seen = env.step(np.zeros(env.action_space.shape))[0] * 3.0 * env.scales.omega
-        row = (rings.next[0] - 1 - env.drawn.sense) % len(rings.q)
+        row = (rings.next - 1 - env.drawn.sense) % len(rings.q)
         errors.append(seen[6 + nj : 6 + 2 * nj] - rings.truth_qvel[row, 6:])
         assert np.abs(seen[6 + nj : 6 + 2 * nj] - seen[-nj:]).max() > 0.1  # of what is believed
     assert 0.17 < np.std(errors) < 0.23 and abs(np.mean(errors)) < 0.05

@@ -238,7 +238,7 @@ def test_wrong_actions_move_nothing():
     """NaN, bounds, shape and text are named; the batch is as it was before."""
     env = native(threads=2)
     env.reset(seed=0)
-    before = env.batch.episodes.observation.copy()
+    before = env.batch.episodes["observation"].copy()
     good = np.zeros(env.action_space.shape)
     for value in (np.nan, 1.5):
         bad = good.copy()
@@ -250,7 +250,7 @@ def test_wrong_actions_move_nothing():
     with pytest.raises(ConfigError, match="must be numbers"):
         env.step("left")
     assert env.get_attr("steps") == (0, 0, 0)
-    assert np.array_equal(env.batch.episodes.observation, before)
+    assert np.array_equal(env.batch.episodes["observation"], before)
     env.step(good)
     env.batch.terminated[1] = True  # this one is reset: its action is not looked at
     bad[0] = 0.0

@@ -148,7 +148,7 @@ def test_free_flight_is_the_same_and_differs_by_the_order_of_the_step(robot):
 
 
 def test_a_push_gives_its_impulse_in_the_same_steps():
-    """In flight the horizontal momentum is that of the push alone, at every step of both."""
+    """In flight the horizontal momentum is that of the push alone, in every step."""
     robot = load_robot()
     push = Push("torso", 0.02, 0.1, 20.0, 30.0)
     qpos = robot.standing_qpos.copy()

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from poise.envs.compiled.maths.pendulum import ankle_limit
 from poise.envs.physics.pushes.push import Kick, Push
-from poise.envs.physics.pushes.table import START, apply_kicks, apply_pushes, pack
+from poise.envs.physics.pushes.table import apply_kicks, apply_pushes, pack
 from poise.envs.robots.robot import load_robot
 
 
@@ -130,7 +130,7 @@ def test_a_kick_on_a_step_boundary_is_added_once(robot, clock):
     table = pack([Kick(0.0, 1.0, 0.0)], robot, 0.0)
     times = [k * dt if clock == "count" else sum([dt] * k) for k in range(300)]
     for k in range(0, 290):
-        table[0, START] = k * 2 / 1000  # the decimal number that a user writes
+        table["start"][0] = k * 2 / 1000  # the decimal number that a user writes
         steps = np.zeros((len(times), robot.model.nv))
         for t, qvel in zip(times, steps, strict=True):
             apply_kicks(table, t, dt, qvel)

@@ -16,10 +16,10 @@ from poise.training.benchmarking.diagnosis.diagnosis import (
     _capture,
     _foothold,
     _saturated,
-    distance_outside,
+    distance_outside_polygon,
     touching_body,
 )
-from poise.training.benchmarking.diagnosis.record import Course, CourseRecord
+from poise.training.benchmarking.diagnosis.record import CourseRecord, TrialCourse
 from poise.training.benchmarking.diagnosis.words import (
     cause,
     diagnosis_of,
@@ -49,9 +49,9 @@ def legs(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def course(rows: int = 10) -> Course:
+def course(rows: int = 10) -> TrialCourse:
     """Two soles that stand still on a square, nothing at its limit."""
-    return Course(
+    return TrialCourse(
         time=0.02 * np.arange(rows),
         load=np.zeros((rows, 2)),
         capture_point=np.full((rows, 2), 0.5),
@@ -74,7 +74,7 @@ def test_the_distance_outside_is_that_from_the_nearest_edge_or_corner(
 ) -> None:
     """Whichever way round the corners go."""
     for polygon in (SQUARE, SQUARE[::-1]):
-        assert distance_outside(polygon, np.array(point)) == pytest.approx(distance)
+        assert distance_outside_polygon(polygon, np.array(point)) == pytest.approx(distance)
 
 
 def test_the_first_motor_at_its_limit_after_the_push() -> None:
@@ -88,7 +88,7 @@ def test_the_first_motor_at_its_limit_after_the_push() -> None:
         1.0,
     )
     told = _saturated(ENV, found, start=0.04)
-    assert told == {"full_motor": "ankle", "full_from": 0.1, "full_time": 0.08}
+    assert told == {"saturated_motor": "ankle", "saturated_from": 0.1, "saturated_time": 0.08}
     assert _saturated(ENV, course(), start=0.0) == {}
 
 
@@ -122,8 +122,8 @@ def test_a_trial_that_is_lost_says_why() -> None:
     push = Push("torso", 0.5, 0.1, 30.0, 0.0)
     outcome = run_trial(agent, Trial(0, 1, (push,)))
     assert outcome.fallen and outcome.loss in ("height", "tilt", "contact")
-    assert outcome.full_motor in robot().motor_names and outcome.capture_outside > 0.05
-    assert 0.5 < outcome.full_from < outcome.capture_left < outcome.fall_time
+    assert outcome.saturated_motor in robot().motor_names and outcome.capture_outside > 0.05
+    assert 0.5 < outcome.saturated_from < outcome.capture_left < outcome.fall_time
     line = {name: "" if v is None else str(v) for name, v in outcome_cells(outcome).items()}
     assert vars(diagnosis_of(line)).items() <= vars(outcome).items()
     assert why(outcome, outcome.fall_time).startswith("fell: ")
@@ -158,7 +158,7 @@ def test_words() -> None:
     plain = replace(found, foothold=None, failures_from=None)
     assert cause(plain, 0) == "ankle_y at its limit, then no planned step"
     assert cause(replace(plain, failures_from=0.5), 1).startswith("QP without a solution, then one")
-    late = replace(plain, failures_from=0.9, full_motor=None, full_from=None)
+    late = replace(plain, failures_from=0.9, saturated_motor=None, saturated_from=None)
     assert cause(late, 0) == "no motor of the legs at its limit, then no planned step"
     assert "from 0.90 s on, when it was falling already" in why(late)
     early = replace(late, failures_from=0.8)

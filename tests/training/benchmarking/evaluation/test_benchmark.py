@@ -27,7 +27,7 @@ from poise.training.benchmarking.evaluation.run import compared
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import replay
 from poise.training.benchmarking.trials.agents import load_agent
-from poise.training.benchmarking.trials.jobs import Job, Stage, play
+from poise.training.benchmarking.trials.jobs import Job, TrialStage, run_job
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.table import outcome_cells
 from poise.training.benchmarking.trials.trial import Conditions, Trial
@@ -110,10 +110,10 @@ def test_the_summary_has_what_readers_rely_on(finished: Path) -> None:
             "workers", "backend", "commit", "seconds"} == set(summary)  # fmt: skip
     assert summary["ranking"] == list(BOTH) and summary["reference"] == "momentum-qp"
     entry = summary["controllers"]["momentum-qp"]
-    assert {"trials", "played", "errors", "root_force_max", "tick_us", "fingerprint", "j50_mean",
+    assert {"trials", "evaluated", "errors", "root_force_max", "tick_us", "fingerprint", "j50_mean",
             "j50_mean_ci95", "eta_mean", "eta_mean_ci95", "eta_min", "directions", "factors",
             "eurobench"} <= set(entry)  # fmt: skip
-    assert entry["played"] == TRIALS and entry["errors"] == 0 and entry["tick_us"] == 12.5
+    assert entry["evaluated"] == TRIALS and entry["errors"] == 0 and entry["tick_us"] == 12.5
     assert summary["rated"] == "mix" and entry["trials"] == 2
     assert [d["trials"] for d in entry["directions"]] == [4, 4]
     for d in entry["directions"]:
@@ -251,10 +251,10 @@ def test_a_controller_that_cannot_be_loaded_is_no_trial(
     with pytest.raises(KeyboardInterrupt):
         benchmark(["flaky.py:Flaky"], suite, out=out)
     before = (out / "trials.jsonl").read_bytes()
-    job = Job(Stage("humanoid", 1.6, StartNoise()), "gone.py:Gone", Trial(0, 5))
+    job = Job(TrialStage("humanoid", 1.6, StartNoise()), "gone.py:Gone", Trial(0, 5))
     with poise.allowing("gone.py:Gone"):
         with pytest.raises(ConfigError, match="gone.py.*cannot be imported"):
-            play(job)
+            run_job(job)
     (tmp_path / "flaky.py").write_text(FLAKY + "# changed")
     with pytest.raises(ConfigError, match="holds trials of 'flaky.py:Flaky', which has changed"):
         benchmark(["zero"], suite, out=out, allow="flaky.py:Flaky")

@@ -107,6 +107,24 @@ def test_the_summary_tells_a_level(tmp_path: Path, in_process: type[InProcess]) 
     assert summary["realism"] == "late+arms"
 
 
+def test_a_controller_that_ran_in_place_of_another_is_named(
+    tmp_path: Path, in_process: type[InProcess]
+) -> None:
+    """In the summary, with its trials, and in a line under the table; not where none ran."""
+    suite, text = write_suite(tmp_path, random_suite(2)), io.StringIO()
+    names = ["feedback-step", "momentum-qp"]
+    for level, expected in (("field", {"feedback-step-field": 2}), ("ideal", None)):
+        console = Console(file=text, width=200)
+        out = tmp_path / level
+        summary = evaluate(names, suite, out=out, realism=level, console=console)
+        entries = summary["controllers"]
+        assert entries["feedback-step"].get("stand_ins") == expected
+        assert "stand_ins" not in entries["momentum-qp"]
+        assert read_summary(out / "summary.json")["controllers"].keys() == entries.keys()
+    line = "feedback-step: feedback-step-field ran in its place in 2 of 2 trials"
+    assert text.getvalue().count(line) == 1
+
+
 def test_a_stopped_evaluation_ends_as_if_it_had_not_been(
     tmp_path: Path, in_process: type[InProcess]
 ) -> None:
@@ -180,7 +198,7 @@ def test_one_command_plays_what_the_other_has_suites_for(
         ("zero", "pd"), ("zero", "momentum-qp"), ("pd", "momentum-qp"),
     ]  # fmt: skip
     for entry in summary["controllers"].values():
-        assert entry["trials"] == 2 and entry["played"] == TRIALS and entry["factors"]
+        assert entry["trials"] == 2 and entry["evaluated"] == TRIALS and entry["factors"]
     assert (tmp_path / "out/polar_envelope.png").exists()
 
 
@@ -280,9 +298,9 @@ def test_a_suite_is_played_again_at_levels(tmp_path: Path, in_process: type[InPr
         if name == "momentum-qp":  # of the other, nothing stands
             assert ideal["torque_variation_median"] < field["torque_variation_median"]
         assert field["unpushed"] == 2
-        assert entry.pop("played") == 2 * alone["controllers"][name]["played"]
+        assert entry.pop("evaluated") == 2 * alone["controllers"][name]["evaluated"]
         before: dict[str, Any] = dict(alone["controllers"][name])
-        before.pop("played")
+        before.pop("evaluated")
         for each in (entry, before):
             each.pop("losses", None)
         assert entry == before

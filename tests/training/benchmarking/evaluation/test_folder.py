@@ -15,7 +15,7 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.physics.pushes.sampler import LimitTable
 from poise.training.benchmarking.evaluation.folder import ResultFolder, Settings, read_settings
 from poise.training.benchmarking.trials.table import COLUMNS, trial_row
-from poise.training.benchmarking.trials.trial import Outcome, Trial, failed
+from poise.training.benchmarking.trials.trial import Outcome, Trial, failed_trial
 from poise.training.running.summary import FORMAT
 
 SETTINGS = Settings(
@@ -48,10 +48,10 @@ def test_finished_trials_come_back_exactly(tmp_path: Path) -> None:
     """Bit for bit, after a stop and after the end; the log stays."""
     folder = start(tmp_path)
     folder.append("pd", 4, OUTCOME)
-    folder.append("pd", 2, failed(RuntimeError("no")))
+    folder.append("pd", 2, failed_trial(RuntimeError("no")))
     folder.close()
     assert read_settings(tmp_path) == SETTINGS
-    expected = {("pd", 4): OUTCOME, ("pd", 2): failed(RuntimeError("no"))}
+    expected = {("pd", 4): OUTCOME, ("pd", 2): failed_trial(RuntimeError("no"))}
     again = start(tmp_path)
     assert again.finished == expected and again.damaged == 0
     again.finish([], SUMMARY)

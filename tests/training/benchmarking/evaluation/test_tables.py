@@ -10,7 +10,12 @@ from typing import Any, cast
 import pytest
 from rich.console import Console
 
-from poise.training.benchmarking.evaluation.tables import places, print_lost, print_summary, ranked
+from poise.training.benchmarking.evaluation.tables import (
+    print_lost,
+    print_summary,
+    ranked,
+    shared_ranks,
+)
 from poise.training.running.summary import Entry, Summary
 
 RESULTS = sorted((Path(__file__).parents[4] / "docs/results").rglob("*.json"))
@@ -34,14 +39,14 @@ def test_results_that_print_alike_share_a_rank(measure: str, step: float) -> Non
         "a": (one, 0.0), "b": (2.0 + step, 0.0), "c": (2.0, 0.0), "d": (1.0, 0.4),
     })  # fmt: skip
     assert ranked(some) == ["b", "a", "c", "d"]
-    assert places(some) == {"b": 1, "a": 2, "c": 2, "d": 4}
+    assert shared_ranks(some) == {"b": 1, "a": 2, "c": 2, "d": 4}
 
 
 def test_a_force_from_nowhere_has_no_rank() -> None:
     """It comes last, however much it recovers, and takes no place."""
     some = entries("j50_mean", {"cheat": (9.0, 2e5), "a": (2.0, 0.0), "b": (1.0, 0.0)})
     assert ranked(some) == ["a", "b", "cheat"]
-    assert places(some) == {"cheat": None, "a": 1, "b": 2}
+    assert shared_ranks(some) == {"cheat": None, "a": 1, "b": 2}
 
 
 def test_without_a_j50_the_rate_decides() -> None:
@@ -49,7 +54,7 @@ def test_without_a_j50_the_rate_decides() -> None:
     some = entries("j50_mean", {"a": (9.0, 0.0), "b": (1.0, 0.0)})
     del some["a"]["j50_mean"]
     some["a"]["recovered_rate"], some["b"]["recovered_rate"] = 0.25, 0.75
-    assert ranked(some) == ["b", "a"] and places(some) == {"a": 2, "b": 1}
+    assert ranked(some) == ["b", "a"] and shared_ranks(some) == {"a": 2, "b": 1}
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])

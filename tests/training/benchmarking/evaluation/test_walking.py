@@ -20,7 +20,7 @@ from poise.training.benchmarking.evaluation.walk_tables import walk_tables
 from poise.training.benchmarking.metrics.walking import phase_figures, walk_levels
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import replay
-from poise.training.benchmarking.trials.trial import Outcome, Trial, failed
+from poise.training.benchmarking.trials.trial import Outcome, Trial, failed_trial
 from poise.training.running.summary import EnvelopeFigures
 from tests.support.evaluations import InProcess, write_suite
 
@@ -112,7 +112,7 @@ def test_levels_count_falls_by_the_minute() -> None:
 def test_who_raises_has_not_walked_for_a_minute() -> None:
     """Trials in which the controller raised add no time; without any time there is no rate."""
     trial = Trial(0, 0, part="walk", level="a", commands=(TimedCommand(0.5),))
-    broken = (trial, failed(ValueError("no")))
+    broken = (trial, failed_trial(ValueError("no")))
     (level,) = walk_levels([(trial, Outcome(True, False)), broken], 60.0)
     assert level["minutes"] == 1.0 and level["trials"] == 2 and level["falls_per_minute"] == 0.0
     (level,) = walk_levels([broken], 60.0)

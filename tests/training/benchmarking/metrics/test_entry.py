@@ -13,7 +13,7 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.metrics.entry import controller_entry
 from poise.training.benchmarking.metrics.pairs import pair_figures
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.random import Quiet
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
@@ -51,7 +51,7 @@ def summarise(
     steps: dict[str, NStepLimit] | None = None,
 ) -> tuple[dict[str, Entry], list[Pair]]:
     """Entries of the controllers, and the pair of the first two."""
-    plan = Plan(Suite(quiet=Quiet()), limits, 0, tuple(results))
+    plan = TrialPlan(Suite(quiet=Quiet()), limits, 0, tuple(results))
     played = {name: list(zip(trials, own, strict=True)) for name, own in results.items()}
     entries = {name: controller_entry(own, plan, (steps or {}).get(name))
                for name, own in played.items()}  # fmt: skip

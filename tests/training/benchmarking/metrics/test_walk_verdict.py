@@ -16,11 +16,11 @@ from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.evaluation.evaluate import evaluate
-from poise.training.benchmarking.evaluation.tables import places, print_summary, ranked
+from poise.training.benchmarking.evaluation.tables import print_summary, ranked, shared_ranks
 from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
 from poise.training.benchmarking.metrics.evaluated import Evaluated
 from poise.training.benchmarking.metrics.pairs import pair_figures
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
@@ -40,9 +40,9 @@ def limits() -> PushLimits:
 
 def figures(
     limits: PushLimits, part: dict[str, Any], ends: dict[str, Any]
-) -> tuple[dict[str, Entry], dict[str, Evaluated], Plan]:
+) -> tuple[dict[str, Entry], dict[str, Evaluated], TrialPlan]:
     """Entries of controllers, whose trials end as `ends` says of each."""
-    plan = Plan(build(Suite, part, "suite"), limits, 3, tuple(ends))
+    plan = TrialPlan(build(Suite, part, "suite"), limits, 3, tuple(ends))
     known = {(name, t.number): end(t) for t in plan.first for name, end in ends.items()}
     for name, trials in plan.second(known).items():
         known |= {(name, trial.number): ends[name](trial) for trial in trials}
@@ -77,7 +77,7 @@ def test_who_never_fell_is_not_behind_who_did(limits: PushLimits, seed: int, tri
     for aims in zip(one["directions"], two["directions"], strict=True):
         assert aims[1]["j50"] >= aims[0]["j50"]
     assert ranked(entries) == ["upright", "weak"]
-    assert places(entries) == {"upright": 1, "weak": 2}
+    assert shared_ranks(entries) == {"upright": 1, "weak": 2}
     pair = pair_figures("weak", "upright", played, entries)
     assert pair["only_a"] == 0 <= pair["only_b"]
     assert pair["j50_gain"] is None or pair["j50_gain"] > 0.0
@@ -103,7 +103,7 @@ def test_walks_without_a_j50_are_ranked_by_falls(
     }
     entries, played, _ = figures(limits, {"duration": 70.0, name: part}, ends)
     assert ranked(entries) == ["follows", "off", "falls"]
-    assert places(entries) == {"follows": 1, "off": 1, "falls": 3}
+    assert shared_ranks(entries) == {"follows": 1, "off": 1, "falls": 3}
     pair = pair_figures("falls", "off", played, entries)
     assert pair["only_a"] == 0 and pair["rate_gain"] == pytest.approx(0.25)
     assert all(level["fallen"] == 0 for level in entries["off"]["walks"])

@@ -22,10 +22,10 @@ from poise.training.benchmarking.metrics.pairs import alike, pair_figures, paire
 from poise.training.benchmarking.results.compare import compare, print_comparison
 from poise.training.benchmarking.results.leaderboard import leaderboard, write_leaderboard
 from poise.training.benchmarking.results.summary import read_summary
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.benchmarking.trials.table import COLUMNS, trial_row
-from poise.training.benchmarking.trials.trial import Trial, failed
+from poise.training.benchmarking.trials.trial import Trial, failed_trial
 from poise.training.cli.entry import main
 from poise.training.running.files import csv_text
 from poise.training.running.provenance import Circumstances
@@ -36,7 +36,7 @@ from tests.training.benchmarking.evaluation.test_folder import OUTCOME
 from tests.training.benchmarking.suites.test_factors import part, small, won_below
 
 WON = replace(OUTCOME, sway=0.1, sway_recovery=1.0)
-LOST = failed(RuntimeError("no"))
+LOST = failed_trial(RuntimeError("no"))
 
 
 CIRCUMSTANCES: Circumstances = {
@@ -62,7 +62,7 @@ def entry(outcomes: list[bool], j50: float) -> Entry:
     compared: Compared = {"lost": 0, "won": 0, "p_mcnemar": 1.0}
     return {
         **rate(sum(outcomes), len(outcomes)),
-        "played": 4, "errors": 0, "root_force_max": 0.5, "tick_us": 80.0, "fingerprint": "0",
+        "evaluated": 4, "errors": 0, "root_force_max": 0.5, "tick_us": 80.0, "fingerprint": "0",
         "j50_mean": j50, "j50_mean_ci95": (j50 - 1, j50 + 1), "j50_mean_per_mass": j50 / 40,
         "j50_min": 9.0, "j50_bounded": 0,
         "eta_mean": 0.7, "eta_mean_ci95": (0.6, 0.8), "eta_min": 0.5,
@@ -142,7 +142,7 @@ def test_trials_with_other_pushes_are_no_pairs(tmp_path: Path) -> None:
     for folder in folders:
         summary = json.loads((folder / "summary.json").read_text())
         (whole,) = summary["controllers"].values()
-        keys = ("trials", "recovered", "recovered_rate", "recovered_ci95", "played", "errors")
+        keys = ("trials", "recovered", "recovered_rate", "recovered_ci95", "evaluated", "errors")
         summary["controllers"]["pd"] = {key: whole[key] for key in keys}
         (folder / "summary.json").write_text(json.dumps(summary | {"rated": None}))
     lines = (folders[2] / "trials.csv").read_text().splitlines()
@@ -240,7 +240,7 @@ def test_the_ankle_limit_may_be_told_in_more_directions(tmp_path: Path) -> None:
     assert error.value.field == "robot"
 
 
-def every(plan: Plan, edge: float = 1e9) -> list[Trial]:
+def every(plan: TrialPlan, edge: float = 1e9) -> list[Trial]:
     """All trials of a controller that recovers pushes below an impulse in the first stage."""
     return plan.trials(won_below(plan, edge))[plan.names[0]]
 
@@ -253,7 +253,7 @@ def test_levels_are_compared_with_the_standard_case_on_the_same_trials() -> None
     played[1] = (played[1][0], replace(OUTCOME, root_force=12.5))  # outside of the mix
     entry = controller_entry(played, plan)
     assert entry["root_force_max"] == 12.5 and entry["trials"] == 2
-    assert entry["errors"] == len(lost) and entry["played"] == len(played)
+    assert entry["errors"] == len(lost) and entry["evaluated"] == len(played)
     (delay,) = (f for f in entry["factors"] if f["factor"] == "delay")
     standard, level = delay["levels"]
     assert (standard["level"], standard["recovered_rate"]) == ("0", 1.0)

@@ -90,7 +90,8 @@ def test_a_robot_that_has_changed_is_said(played: Path, tmp_path: Path) -> None:
 def test_an_outcome_is_read_back_from_its_line() -> None:
     """Every type of column; what is empty or missing is the default."""
     outcome = Outcome(True, False, 1.25, steps=3, foot_displaced=True, surfaces_passed=2,
-                      full_motor="knee", last_speed_error=0.125, drawn='{"mass": 1}')  # fmt: skip
+                      saturated_motor="knee", last_speed_error=0.125,
+                      randomised='{"mass": 1}')  # fmt: skip
     line = {name: "" if cell is None else str(cell) for name, cell in
             outcome_cells(outcome).items()}  # fmt: skip
     assert read_outcome({"trial": "0", **line}, Path("a")) == outcome

@@ -3,7 +3,8 @@
 import json
 from pathlib import Path
 
-from poise.training.benchmarking.results.leaderboard import write_leaderboard
+from poise.training.benchmarking.results.leaderboard import leaderboard, write_leaderboard
+from poise.training.benchmarking.results.summary import read_summary
 
 RESULT = Path(__file__).parents[4] / "docs/results/booster_t1.json"
 
@@ -35,3 +36,21 @@ def test_levels_of_realism_are_columns(tmp_path: Path) -> None:
         assert found == [f"{cell['recovered_rate']:.0%}" for cell in cells], name
     plain = write_leaderboard([without], tmp_path / "plain.md").read_text()
     assert "chatter [1/s] |\n" in plain and "`field`" not in plain
+
+
+def test_the_standard_of_all_factors_is_one_row() -> None:
+    """First, and named by every factor; each other level has its own, but for realism."""
+    summary = json.loads(RESULT.read_text())
+    entry = summary["controllers"][summary["ranking"][0]]
+    page = leaderboard({"a": read_summary(RESULT)})
+    table = page.partition("| factor | level |")[2].split("\n")[2:]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table if line]
+    levels = [(f["factor"], cell) for f in entry["factors"] for cell in f["levels"]]
+    own = [cell for _, cell in levels if cell["standard"]]
+    assert len(own) == len(entry["factors"]) > 3 and len({c["recovered_rate"] for c in own}) == 1
+    assert rows[0][0] == "standard" and rows[0][1].count(",") == len(own) - 1
+    assert rows[0][2] == f"{own[0]['recovered_rate']:.0%}"
+    others = [each for each in levels if not each[1]["standard"] and each[0] != "realism"]
+    assert [row[:3] for row in rows[1:]] == [
+        [factor, str(cell["level"]), f"{cell['recovered_rate']:.0%}"] for factor, cell in others
+    ]

@@ -12,11 +12,13 @@ from typing import Any
 
 import pytest
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, PoiseWarning
 from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS
+from poise.training.benchmarking.evaluation.folder import read_outcomes
 from poise.training.benchmarking.results.leaderboard import leaderboard
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.summary import read_summary
+from poise.training.benchmarking.trials.trial import FORMER
 from poise.training.running.summary import both_ends
 from tests.support.report_folders import copied, finished
 
@@ -51,6 +53,36 @@ def test_what_was_lost_says_why_and_older_results_say_nothing(tmp_path: Path) ->
         writer.writeheader()
         writer.writerows(rows)
     assert {record.why for record in load_results(old).records} == {""}
+
+
+NOW = {new: old for old, new in FORMER.items()}
+
+
+def in_older_names(folder: Path) -> None:
+    """The files as the release before wrote them."""
+    for path in (folder / "trials.csv", folder / "trials.jsonl"):
+        text = re.sub("|".join(NOW), lambda match: NOW[match[0]], path.read_text())
+        path.write_text(text)
+    path = folder / "summary.json"
+    path.write_text(path.read_text().replace('"evaluated":', '"played":'))
+
+
+def test_older_names_are_read_for_one_release(tmp_path: Path) -> None:
+    """A line for each file; results, and trials that are kept, are those of today."""
+    old = copied("random", tmp_path)
+    in_older_names(old)
+    assert "full_motor" in (old / "trials.csv").read_text()
+    with pytest.warns(PoiseWarning, match="older names") as caught:
+        found = load_results(old)
+    assert sorted(Path(str(each.message).partition(":")[0]).name for each in caught) == [
+        "summary.json", "trials.csv",
+    ]  # fmt: skip
+    now = load_results(finished("random"))
+    assert (found.summary, len(found.records)) == (now.summary, len(now.records))
+    assert [each.line for each in found.records] == [each.line for each in now.records]
+    assert "saturated_motor" in found.records[0].line and "randomised" in found.records[0].line
+    with pytest.warns(PoiseWarning, match="trials.jsonl: .*'full_motor' is now 'saturated_motor'"):
+        assert read_outcomes(old) == read_outcomes(finished("random"))
 
 
 def test_a_loss_of_another_name_is_told_as_it_is(tmp_path: Path) -> None:
@@ -122,7 +154,7 @@ def cells(**texts: str) -> Callable[[Path], None]:
         (edit("trials.csv", ",recovered,", ",won,"), "lacks the columns recovered"),
         (edit("trials.csv", "False", "Maybe"), "does not parse"),
         (
-            cells(full_from="zero"),
+            cells(saturated_from="zero"),
             "line 2 does not parse: could not convert string to float: 'zero'",
         ),
         (cells(capture_left="0.2", capture_outside=""), "capture_left without capture_outside"),
@@ -131,7 +163,7 @@ def cells(**texts: str) -> Callable[[Path], None]:
         (edit("trials.csv", ",zero,", ",one,"), "'one' is not in summary.json"),
         (edit("summary.json", '"zero": {', '"other": {'), "ranking: must name all controllers"),
         (edit("settings.yaml", "zero: ", "one: "), "not those of settings.yaml"),
-        (summary(played=9), "has 8 trials"),
+        (summary(evaluated=9), "has 8 trials"),
         (summary(recovered=99), "recovered: must be a whole number"),
         (summary(recovered_rate="all"), "recovered_rate: must be a number, not 'all'"),
         (summary(trials=0), "trials: must be at least 1"),

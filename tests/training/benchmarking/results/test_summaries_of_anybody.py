@@ -126,7 +126,7 @@ def at(value: Any, place: tuple) -> Any:
     return value
 
 
-@pytest.mark.parametrize("key", ["trials", "recovered", "fallen", "played"])
+@pytest.mark.parametrize("key", ["trials", "recovered", "fallen", "evaluated"])
 def test_a_report_counts_no_more_than_there_can_be(tmp_path: Path, key: str) -> None:
     """Statistics of larger numbers end in an error of their own."""
     folder = write_result(tmp_path / "a", {"pd": YES})

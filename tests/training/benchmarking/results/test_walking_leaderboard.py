@@ -143,3 +143,30 @@ def test_results_that_do_not_fit_are_named(tmp_path: Path, change: Any, says: st
     with pytest.raises(ConfigError, match=says) as error:
         write_leaderboard([ONE, changed(tmp_path / "b.json", OTHER, change)], page)
     assert str(tmp_path / "b.json") in str(error.value) and page.read_text() == "before"
+
+
+def test_kicks_have_a_column_each_and_levels_tables_of_their_own(tmp_path: Path) -> None:
+    """Who stays upright after a kick; a result of `field` neither replaces nor ranks with one of
+    `ideal`, whatever the names."""
+
+    def kicked(data: dict[str, Any]) -> None:
+        walks = data["controllers"]["walk"]["walks"]
+        for size, fallen in (("1 m/s", 2), ("3 m/s", 15)):
+            walks.append({**walks[0], "part": "walk_kick", "level": size,
+                          "trials": 20, "fallen": fallen})  # fmt: skip
+
+    def later(data: dict[str, Any]) -> None:
+        data["realism"] = "field"
+
+    page = tmp_path / "page.md"
+    one = changed(tmp_path / "a.json", ONE, kicked)
+    namesake = tmp_path / "namesake.json"
+    namesake.write_text(OTHER.read_text().replace('"walk-spring"', '"walk"'))
+    write_leaderboard([one, OTHER, changed(tmp_path / "b.json", namesake, later)], page)
+    ideal, field = page.read_text().split("## Realism level `field`")
+    head, _, *ranked = rows(ideal)
+    assert head[6:8] == ["kicked 1 m/s", "kicked 3 m/s"]
+    assert {row[1]: row[7:9] for row in ranked[:2]} == {
+        "`walk`": ["18 of 20", "5 of 20"], "`walk-spring`": ["–", "–"]}  # fmt: skip
+    assert [row[:2] for row in rows(field)[2:3]] == [["1", "`walk`"]]
+    assert rows(field)[2][2] == ranked[1][2] and "kicked" not in field

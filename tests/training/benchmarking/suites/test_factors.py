@@ -10,25 +10,25 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import Suite, load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.table import trial_row
-from poise.training.benchmarking.trials.trial import Outcome, Trial, failed
+from poise.training.benchmarking.trials.trial import Outcome, Trial, failed_trial
 from tests.support.benchmarks_small import SMALL, TRIALS
 from tests.support.shared import robot
 
 
-def small(seed: int = 0, names: tuple[str, ...] = ("a",), **changes: object) -> Plan:
+def small(seed: int = 0, names: tuple[str, ...] = ("a",), **changes: object) -> TrialPlan:
     suite = build(Suite, {**SMALL, **changes}, "small")
-    return Plan(suite, PushLimits(robot()), seed, names)
+    return TrialPlan(suite, PushLimits(robot()), seed, names)
 
 
-def part(plan: Plan, name: str) -> list[Trial]:
+def part(plan: TrialPlan, name: str) -> list[Trial]:
     return [trial for trial in plan.first if trial.part == name]
 
 
-def won_below(plan: Plan, edge: float) -> dict[tuple[str, int], Outcome]:
+def won_below(plan: TrialPlan, edge: float) -> dict[tuple[str, int], Outcome]:
     """The first stage, as if pushes below an impulse had been recovered."""
     return {
         (name, trial.number): Outcome(trial.push is None or trial.push.impulse < edge, False)
@@ -39,7 +39,7 @@ def won_below(plan: Plan, edge: float) -> dict[tuple[str, int], Outcome]:
 @pytest.mark.parametrize("name", ["quick", "standard", "full"])
 def test_the_packaged_suites_of_benchmarks(name: str) -> None:
     """Every trial has a number of its own; the standard suite asks all that a ranking needs."""
-    plan = Plan(load_suite(name), PushLimits(robot()), 0, ["a"])
+    plan = TrialPlan(load_suite(name), PushLimits(robot()), 0, ["a"])
     numbers = [trial.number for trial in plan.trials(won_below(plan, 1e9))["a"]]
     assert numbers == list(range(plan.count))
     if name == "standard":
@@ -123,7 +123,7 @@ def test_levels_meet_the_same_starts_directions_and_fractions() -> None:
 def test_the_standard_friction_is_that_of_the_contacts() -> None:
     """Soles of a priority of their own decide it: `compact` stands on 0.8, though its ground has
     1.0, and the suite's level 1.0 is another cell."""
-    cases = Plan(load_suite("standard"), PushLimits(robot("compact")), 0, ["a"])
+    cases = TrialPlan(load_suite("standard"), PushLimits(robot("compact")), 0, ["a"])
     assert cases.standard["friction"] == "0.8"
     levels = {case.conditions.friction for case in cases.first if case.factor == "friction"}
     assert levels == {0.4, 0.6, 1.0}
@@ -190,6 +190,6 @@ def test_resized_suites_have_small_cells() -> None:
 def test_an_error_is_a_row_like_others() -> None:
     """Not recovered, no figures, and what was raised on one line."""
     case = small().first[0]
-    row = trial_row(case, "mine", failed(RuntimeError("a\nb")))
+    row = trial_row(case, "mine", failed_trial(RuntimeError("a\nb")))
     assert row["error"] == "RuntimeError: a b" and row["recovered"] is False
     assert row["energy"] is None and row["impulse"] == case.push.impulse

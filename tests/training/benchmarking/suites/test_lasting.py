@@ -11,7 +11,7 @@ from poise.training.benchmarking.metrics.lasting import (
     survived,
     sustained_figures,
 )
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
@@ -23,7 +23,7 @@ def limits() -> PushLimits:
 
 
 def trials_of(name: str, limits: PushLimits, count: int) -> list[Trial]:
-    return Plan(load_suite(name).resized(count), limits, 5, ["a"]).first
+    return TrialPlan(load_suite(name).resized(count), limits, 5, ["a"]).first
 
 
 def test_sustained_pushes_are_as_described(limits: PushLimits) -> None:
@@ -69,7 +69,7 @@ def test_side_wind_is_for_controllers_that_walk(limits: PushLimits) -> None:
     """The suite walks; its pushes come from either side."""
     suite = load_suite("walk-wind")
     assert suite.walks and not load_suite("sustained").walks and not load_suite("gusts").walks
-    trials = Plan(suite, limits, 5, ["a"]).first
+    trials = TrialPlan(suite, limits, 5, ["a"]).first
     directions = np.array([trial.pushes[0].direction for trial in trials])
     assert all(trial.commands for trial in trials)
     turned = np.abs((directions + 180.0) % 360.0 - 180.0)

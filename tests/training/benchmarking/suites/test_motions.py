@@ -8,15 +8,15 @@ from poise.configs.errors import ConfigError
 from poise.configs.schema import build
 from poise.envs.physics.pushes.sampler import LimitTable
 from poise.training.benchmarking.suites.draw import Draw
-from poise.training.benchmarking.suites.motions import PART, STANDING, Motions
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.motions import PART, STANDING, MotionTrials
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import Suite, load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits, load_limits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from tests.support.physics import robot_named
 
 DURATIONS = {STANDING: 1.0, "bow": 4.0, "squat": 8.0}
-PARTS = Motions(("bow", "squat"), directions=3, shares=(0.0, 0.5, 1.0), trials=2)
+PARTS = MotionTrials(("bow", "squat"), directions=3, shares=(0.0, 0.5, 1.0), trials=2)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_the_measured_j50_is_that_of_its_controller_alone(limits: PushLimits) ->
 
 def test_shares_of_the_limits_are_the_same_pushes_for_all(limits: PushLimits) -> None:
     suite = Suite(motions=replace(PARTS, of="limits"))
-    plan = Plan(suite, limits, 4, ("pd", "momentum-qp"), DURATIONS)
+    plan = TrialPlan(suite, limits, 4, ("pd", "momentum-qp"), DURATIONS)
     assert plan.count == 2 * len(plan.first) and {t.part for t in plan.first} == {PART}
     outcome = Outcome(recovered=True, fallen=False)
     finished = {(name, t.number): outcome for name in plan.names for t in plan.first}
@@ -76,7 +76,7 @@ def test_shares_of_the_limits_are_the_same_pushes_for_all(limits: PushLimits) ->
     assert trials["pd"] == trials["momentum-qp"] == plan.first
     unmeasured = PushLimits(robot_named("compact"))
     with pytest.raises(ConfigError, match="share: no J50 of 'compact' was measured"):
-        Plan(suite, unmeasured, 4, ("pd",), DURATIONS)
+        TrialPlan(suite, unmeasured, 4, ("pd",), DURATIONS)
 
 
 def test_the_table_of_limits_is_read_with_its_controller(limits: PushLimits) -> None:

@@ -14,11 +14,11 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import LimitTable, PushSampler
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.diagnosis.record import swing_of
-from poise.training.benchmarking.suites.plan import Plan
-from poise.training.benchmarking.suites.random import Sequence
+from poise.training.benchmarking.suites.plan import TrialPlan
+from poise.training.benchmarking.suites.random import PushSequence
 from poise.training.benchmarking.suites.suite import Suite, load_suite
 from poise.training.benchmarking.trials.agents import load_agent
-from poise.training.benchmarking.trials.play import Touchdowns, run_trial
+from poise.training.benchmarking.trials.play import TouchdownCounter, run_trial
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.table import read_trial, trial_row
 from poise.training.benchmarking.trials.trial import Trial
@@ -31,7 +31,7 @@ def limits() -> PushLimits:
 
 
 def drawn(suite: Suite, limits: PushLimits) -> list[Trial]:
-    return Plan(suite, limits, 3, ["a"]).first
+    return TrialPlan(suite, limits, 3, ["a"]).first
 
 
 def test_repeated_pushes_come_every_two_to_five_seconds_for_a_minute(limits: PushLimits) -> None:
@@ -67,7 +67,7 @@ def test_the_second_push_of_in_step_is_the_smaller_one(limits: PushLimits) -> No
 def test_a_share_of_a_controllers_own_limits(limits: PushLimits) -> None:
     """controller_fraction is one of the table given, which may be any controller's."""
     pushes = PushSampler(magnitude=(0.5, 0.5), unit="controller_fraction", count=(2, 2))
-    trials = drawn(Suite(sequence=Sequence(trials=2, pushes=pushes)), limits)
+    trials = drawn(Suite(sequence=PushSequence(trials=2, pushes=pushes)), limits)
     assert [push.impulse for t in trials for push in t.pushes] == [8.0] * 4
 
 
@@ -110,7 +110,7 @@ def test_a_line_of_trials_csv_holds_all_pushes(limits: PushLimits, tmp_path: Pat
 
 def test_touchdowns_count_feet_that_were_in_the_air() -> None:
     """A foot that rocks for 60 ms has not stepped; one that is up for 80 ms has, when it lands."""
-    touchdowns = Touchdowns(2, 0.02)
+    touchdowns = TouchdownCounter(2, 0.02)
     for up in (3, 4, 10):
         for contacts in [[0.0, 1.0]] * up + [[1.0, 1.0]]:
             touchdowns.update(np.array(contacts))
@@ -124,7 +124,7 @@ def test_touchdowns_count_feet_that_were_in_the_air() -> None:
 
 def test_steps_are_those_that_were_planned() -> None:
     """Of a controller with a plan: the foot that it swung; a foot that is thrown up is none."""
-    touchdowns = Touchdowns(2, 0.02)
+    touchdowns = TouchdownCounter(2, 0.02)
     for swinging, count in ((-1, 0), (1, 0), (0, 1), (0, 2)):
         for _ in range(5):
             touchdowns.update(np.array([0.0, 1.0]), swinging)
@@ -164,4 +164,4 @@ def test_a_wrong_sequence_is_refused(tmp_path: Path, fields: dict, message: str)
     path = write_suite(tmp_path, {"sequence": fields})
     with pytest.raises(ConfigError, match=message):
         load_suite(path)
-    assert build(Suite, {"sequence": {}}, "") == Suite(sequence=Sequence())
+    assert build(Suite, {"sequence": {}}, "") == Suite(sequence=PushSequence())

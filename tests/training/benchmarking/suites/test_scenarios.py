@@ -15,7 +15,7 @@ from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import replay
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome
@@ -40,8 +40,8 @@ EACH: dict[str, Any] = {
 SUITE = {"duration": 5.0, "scenarios": {"each": EACH}}
 
 
-def planned(standing: tuple[str, ...] = ()) -> Plan:
-    return Plan(load_suite("scenarios"), PushLimits(robot()), 3, ("a", "b"), standing=standing)
+def planned(standing: tuple[str, ...] = ()) -> TrialPlan:
+    return TrialPlan(load_suite("scenarios"), PushLimits(robot()), 3, ("a", "b"), standing=standing)
 
 
 def test_equal_pushes_meet_arms_and_loads() -> None:
@@ -65,7 +65,7 @@ def test_equal_pushes_meet_arms_and_loads() -> None:
 def test_a_level_of_the_suite_has_the_scenarios_own_on_top() -> None:
     """The same trials, in `field` besides; whose level is none but `field` say so."""
     suite = replace(load_suite("scenarios"), realism="field")
-    there = Plan(suite, PushLimits(robot()), 3, ("a", "b")).first
+    there = TrialPlan(suite, PushLimits(robot()), 3, ("a", "b")).first
     on_top = {"arms": "field+arms", "payload": "field+hand-load"}
     for one, other in zip(planned().first, there, strict=True):
         assert other.conditions.realism == on_top.get(str(other.level), "field")
@@ -106,8 +106,8 @@ def test_a_result_is_the_same_in_any_order_and_is_played_again(
     assert all(each["trials"] == EACH[each["scenario"]]["trials"] for each in walker)
     results = load_results(tmp_path / "a")
     told = {record.trial: record.line for record in results.of("walk")}
-    assert '"arms": 0.' in told[3]["drawn"] and '"hand": 0.0' in told[5]["drawn"]
-    assert told[1]["drawn"] == "" and told[0]["until"] == "4.2"
+    assert '"arms": 0.' in told[3]["randomised"] and '"hand": 0.0' in told[5]["randomised"]
+    assert told[1]["randomised"] == "" and told[0]["until"] == "4.2"
     assert told[0]["fallen"] == "False"
     lasted = float(told[0]["energy"]) / float(told[0]["mean_power"])
     assert lasted == pytest.approx(4.2, abs=0.01)
@@ -135,7 +135,7 @@ def test_a_result_is_the_same_in_any_order_and_is_played_again(
 def test_wrong_fields_are_named(tmp_path: Path, change: dict[str, Any], says: str) -> None:
     path = write_suite(tmp_path, {**SUITE, **change})
     with pytest.raises(ConfigError, match=says):
-        Plan(load_suite(path), PushLimits(robot()), 0, ["a"])
+        TrialPlan(load_suite(path), PushLimits(robot()), 0, ["a"])
 
 
 def test_a_robot_without_arms_is_refused_at_once(

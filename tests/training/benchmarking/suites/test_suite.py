@@ -17,7 +17,7 @@ from poise.envs.physics.pushes.sampler import LimitTable
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.suites.directions import Envelope, Grid
 from poise.training.benchmarking.suites.factors import Factors, Levels
-from poise.training.benchmarking.suites.plan import LEVEL, Plan
+from poise.training.benchmarking.suites.plan import LEVEL, TrialPlan
 from poise.training.benchmarking.suites.random import Quiet
 from poise.training.benchmarking.suites.suite import Suite, load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
@@ -31,10 +31,10 @@ def limits() -> PushLimits:
 
 
 def first(suite: Suite, limits: PushLimits, seed: int) -> list[Trial]:
-    return Plan(suite, limits, seed, ["a"]).first
+    return TrialPlan(suite, limits, seed, ["a"]).first
 
 
-def finished(plan: Plan, won: Callable[[str, Trial], bool]) -> dict[tuple[str, int], Outcome]:
+def finished(plan: TrialPlan, won: Callable[[str, Trial], bool]) -> dict[tuple[str, int], Outcome]:
     """The first stage, as if it had been played."""
     return {(name, trial.number): Outcome(recovered=won(name, trial), fallen=False)
             for name in plan.names for trial in plan.first}  # fmt: skip
@@ -47,7 +47,7 @@ def test_every_packaged_suite_gives_as_many_trials_as_it_says(
     """Numbers run from 0, start seeds differ, the same seed gives the same trials."""
     suite = load_suite(name).resized(3)
     motions = dict.fromkeys(suite.motions.labels, 5.0) if suite.motions else {}
-    plan = Plan(suite, limits, 7, ["a", "b"], motions)
+    plan = TrialPlan(suite, limits, 7, ["a", "b"], motions)
     found = plan.trials(finished(plan, lambda name, trial: False))
     assert sum(len(trials) for trials in found.values()) == plan.count
     for trials in found.values():
@@ -57,7 +57,7 @@ def test_every_packaged_suite_gives_as_many_trials_as_it_says(
         alike = ("factors", "motions", "scenarios")  # whose cells start alike
         own = [trial.seed for trial in once if trial.part not in alike]
         assert len(set(own)) == len(own)
-    assert first(suite, limits, 7) == Plan(suite, limits, 7, ["a"]).first
+    assert first(suite, limits, 7) == TrialPlan(suite, limits, 7, ["a"]).first
     other = first(suite, limits, 8)
     assert not {trial.seed for trial in other} & {trial.seed for trial in plan.first}
     if name not in ("grid", "wide-grid", "quiet", "repeated") and not (
@@ -102,7 +102,7 @@ def test_the_second_stage_surrounds_each_rough_j50(limits: PushLimits) -> None:
     part = Envelope(directions=2, first_trials=20, trials=10, spread=0.2, impulses=(0.12, 0.9),
                     paired=True)  # fmt: skip
     suite, edge = Suite(envelope=part), {"weak": 12.0, "strong": 20.0}
-    plan = Plan(suite, limits, 0, tuple(edge))
+    plan = TrialPlan(suite, limits, 0, tuple(edge))
     played = finished(plan, lambda name, trial: trial.push.impulse < edge[name])
     second = plan.second(played)["weak"]
     assert second == plan.second(played)["strong"]
@@ -114,7 +114,7 @@ def test_the_second_stage_surrounds_each_rough_j50(limits: PushLimits) -> None:
         assert weak.max() == pytest.approx(1.2 * 12.0, rel=0.12)
         assert strong.mean() == pytest.approx(20.0, rel=0.06)
         assert np.diff(weak).max() < 2 * 0.4 * 13.0 / 10
-    alone = Plan(Suite(envelope=replace(part, paired=False)), limits, 0, tuple(edge))
+    alone = TrialPlan(Suite(envelope=replace(part, paired=False)), limits, 0, tuple(edge))
     assert alone.first == plan.first and alone.count == plan.count - 2 * 2 * 10
     own = alone.second(played)
     assert own["weak"][0].push.impulse == second[0].push.impulse
@@ -173,7 +173,7 @@ def test_an_unknown_suite_or_body_is_refused(limits: PushLimits) -> None:
     with pytest.raises(ConfigError, match="envelope.*grid.*quiet.*random"):
         load_suite("rndom")
     with pytest.raises(ConfigError, match="tail.*torso"):
-        Plan(Suite(body="tail", quiet=Quiet()), limits, 0, ["a"])
+        TrialPlan(Suite(body="tail", quiet=Quiet()), limits, 0, ["a"])
 
 
 def test_levels_meet_the_same_starts_and_pushes(limits: PushLimits) -> None:
@@ -183,8 +183,8 @@ def test_levels_meet_the_same_starts_and_pushes(limits: PushLimits) -> None:
         factors=Factors(trials=2, levels=Levels(delay=(0.01,))),
         quiet=Quiet(2),
     )
-    plan = Plan(replace(own, levels=("lab", "field")), limits, 7, ["a"])
-    alone = Plan(own, limits, 7, ["a"])
+    plan = TrialPlan(replace(own, levels=("lab", "field")), limits, 7, ["a"])
+    alone = TrialPlan(own, limits, 7, ["a"])
     # at `lab` nothing is recovered, elsewhere all is
     lost = {trial.number for trial in plan.first if trial.part.endswith("@lab")}
     found = plan.trials(finished(plan, lambda name, trial: trial.number not in lost))["a"]

@@ -16,7 +16,7 @@ from poise.envs.robots.robot import load_robot
 from poise.envs.terrain.stairs import Stairs
 from poise.envs.terrain.stones import Stones
 from poise.training.benchmarking.metrics.walking import walk_levels
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import Suite, load_suite
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.benchmarking.trials.play import run_trial
@@ -28,7 +28,7 @@ from poise.training.benchmarking.trials.variants import AgentVariants
 
 def test_every_terrain_is_met_with_errors_of_its_own() -> None:
     limits = PushLimits(load_robot(), LimitTable((0.0,), (16.0,)))
-    found = Plan(load_suite("stairs"), limits, 7, ["walk"]).first
+    found = TrialPlan(load_suite("stairs"), limits, 7, ["walk"]).first
     levels = {trial.level for trial in found}
     assert {"up 0.10", "down 0.10", "up 0.15", "slope -8° unseen"} <= levels
     assert all(sum(trial.level == level for trial in found) == 20 for level in levels)

@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.schema import build
 from poise.envs.physics.pushes.sampler import LimitTable
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import Suite, load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
@@ -22,7 +22,7 @@ def limits() -> PushLimits:
 
 
 def trials(name: str, limits: PushLimits) -> list[Trial]:
-    return Plan(load_suite(name), limits, 7, ["walk"]).first
+    return TrialPlan(load_suite(name), limits, 7, ["walk"]).first
 
 
 def test_a_walk_has_every_command(limits: PushLimits) -> None:
@@ -43,7 +43,7 @@ def test_a_walk_has_all_of_its_command(limits: PushLimits) -> None:
     command = {"ahead": 0.4, "step_time": 0.35, "width": 0.2}
     for part in ("walk", "walk_push", "walk_kick", "walk_repeated"):
         field = {"commands": [command]} if part == "walk" else {"command": command}
-        plan = Plan(build(Suite, {part: field}, "suite"), limits, 7, ["walk"])
+        plan = TrialPlan(build(Suite, {part: field}, "suite"), limits, 7, ["walk"])
         assert {trial.command for trial in plan.first} == {TimedCommand(**command)}
         levels = {trial.level for trial in plan.first if part != "walk_kick"}
         assert levels <= {"ahead 0.4, step_time 0.35, width 0.2"}
@@ -60,13 +60,13 @@ def test_pushes_come_at_all_phases(limits: PushLimits) -> None:
         for period in (0.5, 0.84):
             counts, _ = np.histogram(starts[chosen] % period / period, 8, (0.0, 1.0))
             assert counts.min() >= 0.5 * counts.mean()
-    other = Plan(load_suite("walk-push"), limits, 8, ["walk"]).first
+    other = TrialPlan(load_suite("walk-push"), limits, 8, ["walk"]).first
     assert other[0].pushes[0].start != starts[0]  # every seed has times of its own
 
 
 def test_second_stage_pushes_walk_too(limits: PushLimits) -> None:
     """Around each controller's own J50, at commands and times of their own; not to fall counts."""
-    plan = Plan(load_suite("walk-push"), limits, 7, ["walk"])
+    plan = TrialPlan(load_suite("walk-push"), limits, 7, ["walk"])
     held = {("walk", t.number): Outcome(False, t.pushes[0].impulse >= 20.0) for t in plan.first}
     second = plan.second(held)["walk"]
     assert len(second) == 16 * 24 and {trial.part for trial in second} == {"walk_push"}
@@ -78,7 +78,7 @@ def test_second_stage_pushes_walk_too(limits: PushLimits) -> None:
 def test_who_does_not_fall_meets_larger_pushes(limits: PushLimits) -> None:
     """Up to 2.5 N·s/kg in the second stage, where the first one makes too few fall; one at it."""
     suite, mass = load_suite("walk-push"), limits.robot.mass
-    plan = Plan(suite, limits, 7, ["strong", "weak"])
+    plan = TrialPlan(suite, limits, 7, ["strong", "weak"])
     assert max(trial.pushes[0].impulse for trial in plan.first) < 1.0 * mass
     fell = {"strong": 10.0 * mass, "weak": 0.5 * mass}
     ends = {(name, t.number): Outcome(True, t.pushes[0].impulse > most)
@@ -97,7 +97,7 @@ def test_who_does_not_fall_meets_larger_pushes(limits: PushLimits) -> None:
 
 def kicks(suite: Suite, limits: PushLimits, level: str) -> tuple[np.ndarray, np.ndarray]:
     """Sizes [m/s] and directions [rad] of the kicks of a level."""
-    found = [t.kicks[0] for t in Plan(suite, limits, 7, ["walk"]).first if t.level == level]
+    found = [t.kicks[0] for t in TrialPlan(suite, limits, 7, ["walk"]).first if t.level == level]
     return (np.array([kick.delta_v for kick in found]),
             np.radians([kick.direction for kick in found]))  # fmt: skip
 

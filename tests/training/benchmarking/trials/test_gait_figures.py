@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.walking.schedule import TimedCommand
-from poise.training.benchmarking.trials.gait_figures import Walk, touchdowns
+from poise.training.benchmarking.trials.gait_figures import RecordedWalk, touchdowns
 from poise.training.benchmarking.trials.gait_record import WalkArrays
 
 PERIOD, STEP, DOWN = 0.02, 0.4, 0.1  # [s] of the rows, of a step, of it with both feet down
@@ -59,9 +59,9 @@ def _plane(points: np.ndarray) -> np.ndarray:
 
 def walk(
     ahead: float = 0.5, left: float = 0.0, turn: float = 0.0, told: TimedCommand | None = None
-) -> Walk:
+) -> RecordedWalk:
     """The walk at these velocities, told to do the same or something else."""
-    return Walk(recorded(ahead, left, turn), (told or TimedCommand(ahead, left, turn),))
+    return RecordedWalk(recorded(ahead, left, turn), (told or TimedCommand(ahead, left, turn),))
 
 
 def test_touchdowns_are_found_and_rocking_feet_are_not() -> None:
@@ -128,7 +128,7 @@ def test_lengths_times_and_costs() -> None:
 )
 def test_the_error_of_steps_is_the_largest_of_what_was_told(told: dict, error: float) -> None:
     """0.3 s in the air, 0.2 m long and wide, 0.06 m high, beside what was commanded."""
-    figures = Walk(recorded(), (TimedCommand(0.5, **told),), transfer_time=DOWN).figures()
+    figures = RecordedWalk(recorded(), (TimedCommand(0.5, **told),), transfer_time=DOWN).figures()
     assert figures["step_error"] == pytest.approx(error, abs=1e-6)
 
 
@@ -138,7 +138,9 @@ def test_a_sole_that_goes_on_after_it_has_landed_stands_further() -> None:
     feet = record.feet.copy()
     for row, foot in list(zip(*touchdowns_of(record), strict=True))[:-1]:  # where the record ends
         feet[row, foot] -= 0.02 * np.array([np.cos(0.3), np.sin(0.3)])  # at touchdown alone
-    figures = Walk(replace(record, feet=feet), (TimedCommand(0.5, step_length=0.2),)).figures()
+    figures = RecordedWalk(
+        replace(record, feet=feet), (TimedCommand(0.5, step_length=0.2),)
+    ).figures()
     assert figures["step_length"] == pytest.approx(0.18, abs=0.001)
     assert figures["step_error"] == pytest.approx(0.0, abs=1e-9)
 
@@ -152,10 +154,10 @@ def touchdowns_of(record: WalkArrays) -> tuple[np.ndarray, np.ndarray]:
 def test_steps_are_those_that_end_settled_strides() -> None:
     """A last step that is longer counts; on a curve lengths are along the heading at each step."""
     record = recorded()
-    told = Walk(record, (TimedCommand(0.5),))
+    told = RecordedWalk(record, (TimedCommand(0.5),))
     feet, row, foot = record.feet.copy(), told.landed.row[-1], told.landed.foot[-1]
     feet[row, foot] += 0.7 * np.array([np.cos(0.3), np.sin(0.3)])
-    longer = Walk(replace(record, feet=feet), (TimedCommand(0.5),)).figures()["step_length"]
+    longer = RecordedWalk(replace(record, feet=feet), (TimedCommand(0.5),)).figures()["step_length"]
     assert longer == pytest.approx(0.5 * STEP + 0.7 / np.count_nonzero(told.settled), abs=1e-9)
     curve = walk(0.4, 0.0, 0.3).figures()
     assert curve["step_length"] == pytest.approx(0.4 * STEP, abs=0.02)
@@ -169,7 +171,7 @@ def test_a_sole_that_slides_on_one_foot() -> None:
     alone = np.flatnonzero(record.down[:, 1] & ~record.down[:, 0])
     feet[alone[3:], 1, 0] += 0.05  # at 0.2 s, when it begins to walk
     feet[alone[record.time[alone] > 8.22], 1, 0] += 0.02
-    slid = Walk(replace(record, feet=feet), (TimedCommand(0.5),)).figures()["foot_slide"]
+    slid = RecordedWalk(replace(record, feet=feet), (TimedCommand(0.5),)).figures()["foot_slide"]
     assert slid == pytest.approx(0.02)
 
 
@@ -180,11 +182,13 @@ def test_a_fall_is_no_part_of_a_walk() -> None:
     knees, feet = record.knees.copy(), record.feet.copy()
     knees[around] += 50.0
     feet[around, 1, 0] += np.linspace(0.0, 3.0, np.count_nonzero(around))
-    fell = Walk(replace(record, knees=knees, feet=feet), (TimedCommand(0.5),), fall_time=15.4)
+    fell = RecordedWalk(
+        replace(record, knees=knees, feet=feet), (TimedCommand(0.5),), fall_time=15.4
+    )
     figures = fell.figures()
     assert figures["knee_peak"] == 1.0 and figures["knee_mean"] == pytest.approx(0.75, abs=0.01)
     assert figures["foot_slide"] == 0.0
-    none = Walk(record, (TimedCommand(0.5),), fall_time=4.0).figures()
+    none = RecordedWalk(record, (TimedCommand(0.5),), fall_time=4.0).figures()
     assert none["knee_peak"] is None and none["foot_slide"] is None
 
 
@@ -192,14 +196,14 @@ def test_only_settled_strides_count() -> None:
     """Those that begin 4 s after a change of the command, and end a second before a fall."""
     record = recorded()
     commands = (TimedCommand(0.9), TimedCommand(0.5, start=8.0))
-    told = Walk(record, commands)
+    told = RecordedWalk(record, commands)
     ends = record.time[told.landed.row[2:]]
     begins = record.time[told.landed.row[:-2]]
     np.testing.assert_array_equal(
         told.settled, ((begins >= 4.0) & (ends < 8.0 - 1e-9)) | (begins >= 12.0)
     )
     np.testing.assert_array_equal(told.wanted[:, 0], np.where(ends < 8.0 - 1e-9, 0.9, 0.5))
-    fell = Walk(record, commands, fall_time=15.0)
+    fell = RecordedWalk(record, commands, fall_time=15.0)
     np.testing.assert_array_equal(fell.settled, told.settled & (ends <= 14.0))
 
 
@@ -214,18 +218,18 @@ def test_as_commanded_is_within_5_cm_a_second_and_5_degrees_a_second() -> None:
     still = recorded()
     down = still.down.copy()
     down[still.time > 18.5] = True
-    assert not Walk(replace(still, down=down), (TimedCommand(0.5),)).as_commanded()
-    assert not Walk(recorded(seconds=1.5), (TimedCommand(0.5),)).as_commanded()
+    assert not RecordedWalk(replace(still, down=down), (TimedCommand(0.5),)).as_commanded()
+    assert not RecordedWalk(recorded(seconds=1.5), (TimedCommand(0.5),)).as_commanded()
 
 
-def changed_at(time: float, ahead: float, later: float, turned: float = 0.0) -> Walk:
+def changed_at(time: float, ahead: float, later: float, turned: float = 0.0) -> RecordedWalk:
     """A walk that is commanded 0.5 m/s, goes at `ahead` and, from `time` on, at `later` m/s, in a
     direction turned by so many degrees."""
     record = recorded()
     yaw = record.yaw + np.where(record.time > time, np.radians(turned), 0.0)
     speed = np.where(record.time > time, later, ahead)[:, None]
     way = speed * PERIOD * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
-    return Walk(replace(record, yaw=yaw, com=np.cumsum(way, axis=0)), (TimedCommand(0.5),))
+    return RecordedWalk(replace(record, yaw=yaw, com=np.cumsum(way, axis=0)), (TimedCommand(0.5),))
 
 
 def test_a_walk_is_compared_with_its_own_strides_before_the_push() -> None:
@@ -250,7 +254,7 @@ def test_own_strides_are_settled_and_follow_the_last_command() -> None:
     """None before 4 s, none of another command; the worst of them counts, a turn's error too."""
     assert walk(0.5).own_error(4.0) is None
     other = walk(0.5, told=TimedCommand(0.9))
-    both = Walk(other.record, (TimedCommand(0.9), TimedCommand(0.5, start=8.0)))
+    both = RecordedWalk(other.record, (TimedCommand(0.9), TimedCommand(0.5, start=8.0)))
     assert both.own_error(11.9) is None  # no settled stride of the last command yet
     own = both.own_error()
     assert own is not None and own.speed == pytest.approx(0.0, abs=1e-9)
@@ -264,10 +268,10 @@ def test_the_distance_from_a_circle() -> None:
     """Nothing on the circle; a walk with another radius is off it by the difference."""
     told = (TimedCommand(0.5, turn=0.25),)
     for speed, off in ((0.5, 0.0), (0.6, 0.4)):  # 2.4 m instead of 2 m
-        found = Walk(recorded(speed, 0.0, 0.25, 40.0), told).figures()["circle_error"]
+        found = RecordedWalk(recorded(speed, 0.0, 0.25, 40.0), told).figures()["circle_error"]
         assert found == pytest.approx(off, abs=0.03)
     crab = (TimedCommand(0.3, left=0.4, turn=0.25),)  # the same circle, not along the heading
-    found = Walk(recorded(0.3, 0.4, 0.25, 40.0), crab).figures()["circle_error"]
+    found = RecordedWalk(recorded(0.3, 0.4, 0.25, 40.0), crab).figures()["circle_error"]
     assert found == pytest.approx(0.0, abs=0.03)
 
 
@@ -281,7 +285,7 @@ def test_the_phase_of_a_push() -> None:
     assert told.phase_at(1.0, left=1) is None
     stood = told.record.down.copy()
     stood[told.record.time > 10.1] = True  # after the 25th touchdown
-    late = Walk(replace(told.record, down=stood), told.commands).phase_at(18.0, left=1)
+    late = RecordedWalk(replace(told.record, down=stood), told.commands).phase_at(18.0, left=1)
     assert late == pytest.approx(1.0) and late < 1.0  # no further than where the next foot lands
 
 
@@ -289,6 +293,6 @@ def test_who_lands_on_both_feet_at_once_has_no_phase() -> None:
     """Not one that is no number: steps of no time have no pace."""
     record = recorded()
     hops = np.repeat(record.down[:, :1], 2, axis=1)
-    told = Walk(replace(record, down=hops), (TimedCommand(0.5),))
+    told = RecordedWalk(replace(record, down=hops), (TimedCommand(0.5),))
     assert len(told.landed.row) > 10
     assert told.phase_at(record.time[told.landed.row[-1]], left=1) is None

@@ -124,6 +124,6 @@ def play(agent: Agent, push: object) -> bool:
     """Whether it walks ahead to the end and does not fall."""
     env = agent.env
     env.reset(seed=4, options={"push": push, "noise": 0.0, "command": {"ahead": 0.5}})
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(agent.act(env.episode.observation))
     return not env.fallen

@@ -12,7 +12,7 @@ from poise.envs.balance.start import FALLEN_POSTURES
 from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.metrics.evaluated import rising
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.benchmarking.trials.play import run_trial
@@ -38,9 +38,9 @@ def test_up_is_a_second_without_a_break():
 
     def place(qpos: np.ndarray, seconds: float) -> None:
         for _ in range(round(seconds / period)):
-            clock = env.simulation.clock[0]
+            clock = env.simulation.clock.steps
             env.simulation.reset(qpos)
-            env.simulation.clock[0] = clock + round(period / env.arrays.timestep)
+            env.simulation.clock.steps = clock + round(period / env.arrays.timestep)
             rising_.update()
 
     place(lying, 1.0)
@@ -70,7 +70,7 @@ def test_a_fall_that_is_watched_is_the_same_fall():
 
 def test_trials_start_on_the_ground():
     """Each from a posture of its own that no training has; who stays down has not recovered."""
-    plan = Plan(load_suite("get-up").resized(5), PushLimits(load_robot()), 3, ["a"])
+    plan = TrialPlan(load_suite("get-up").resized(5), PushLimits(load_robot()), 3, ["a"])
     starts = [trial.start or 0 for trial in plan.first]
     assert len(set(starts)) == 5 and min(starts) >= FALLEN_POSTURES
     lying = run_trial(agent("zero", 1.5, terminates=False), plan.first[0])
@@ -81,9 +81,9 @@ def test_trials_start_on_the_ground():
 def test_get_up_gives_every_trial_time():
     """A fall of the suite is followed by so many seconds; the trial ends when it did otherwise."""
     suite = replace(load_suite("strong").resized(2), get_up_time=10.0)
-    plan = Plan(suite, PushLimits(load_robot()), 3, ["a"])
+    plan = TrialPlan(suite, PushLimits(load_robot()), 3, ["a"])
     assert all(t.get_up == 10.0 and t.until == suite.duration for t in plan.first)
-    before = Plan(load_suite("strong").resized(2), PushLimits(load_robot()), 3, ["a"])
+    before = TrialPlan(load_suite("strong").resized(2), PushLimits(load_robot()), 3, ["a"])
     assert [t.pushes for t in plan.first] == [t.pushes for t in before.first]
 
 

@@ -12,7 +12,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.trials.agents import Agent, load_agent
-from poise.training.benchmarking.trials.play import lean, run_trial
+from poise.training.benchmarking.trials.play import run_trial, tilt_of
 from poise.training.benchmarking.trials.table import COLUMNS, trial_row
 from poise.training.benchmarking.trials.trial import Trial
 
@@ -88,4 +88,4 @@ def test_lean_is_the_tilt_of_the_root_at_the_end(agent: Agent) -> None:
     axes = env.simulation.state_arrays.root_axes
     tilted = Rotation.from_euler("zy", [40.0, 5.0], degrees=True).as_matrix()
     axes[:] = tilted @ env.simulation.arrays.root_standing
-    assert lean(env) == pytest.approx(5.0)
+    assert tilt_of(env) == pytest.approx(5.0)

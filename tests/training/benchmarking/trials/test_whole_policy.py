@@ -22,7 +22,7 @@ def track(agent: Agent, push: object) -> tuple[bool, list[float], np.ndarray]:
     """Whether it recovered, the servos' shares, and where it ended."""
     env, shares = agent.env, []
     env.reset(seed=4, options={"push": push, "noise": 0.0})
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(agent.act(env.episode.observation))
         shares.append(getattr(env, "authority", 0.0))
     return env.recovered and not env.fallen, shares, env.data.qpos.copy()

@@ -52,7 +52,7 @@ def test_a_script_becomes_a_file_and_the_record_of_it(
     clip = read_bvh(out, "m", "y", "z").clip
     assert clip.duration == pytest.approx(record["duration"], abs=0.02)
     assert record["script"] == "<up> -> stand -> squat -> <up>\n" and record["seconds"] > 0.0
-    assert record["played"][-1]["ends"] == pytest.approx(record["duration"])
+    assert record["parts"][-1]["ends"] == pytest.approx(record["duration"])
 
 
 def test_a_script_is_performed_by_one_command(

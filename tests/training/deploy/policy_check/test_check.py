@@ -23,7 +23,7 @@ from poise.training.cli.entry import main
 from poise.training.deploy.policy_check import check as checking
 from poise.training.deploy.policy_check.check import Stood, check_policy
 from poise.training.deploy.policy_check.guess import layouts
-from poise.training.deploy.policy_check.rollout import Finding, compare
+from poise.training.deploy.policy_check.rollout import Finding, compare_rollout
 from tests.support.policies import linear, within, write_onnx, write_yaml
 from tests.support.shared import robot
 
@@ -153,7 +153,7 @@ def record(place: Path) -> None:
 def findings(place: Path, rollout: str = "full.npz", **changes: Any) -> list[Finding]:
     config = controller_config(str(described(place, **changes)))
     policy = PolicyFile(robot("compact"), config)
-    return compare(policy, place / rollout)
+    return compare_rollout(policy, place / rollout)
 
 
 def test_a_right_adapter_agrees_with_its_makers_rollout(folder: Path) -> None:
@@ -192,7 +192,7 @@ def test_a_wrong_adapter_is_found_out(
 def test_another_network_answers_otherwise(folder: Path, tmp_path: Path) -> None:
     """From the same observations."""
     write_onnx(tmp_path / "policy.onnx", linear(9 + 3 * N, N, 0.05, seed=1))
-    (network, *_) = compare(
+    (network, *_) = compare_rollout(
         PolicyFile(robot("compact"), controller_config(str(described(tmp_path)))),
         folder / "full.npz",
     )

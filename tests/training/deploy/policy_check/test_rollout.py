@@ -13,7 +13,7 @@ import poise
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError
-from poise.training.deploy.policy_check.rollout import Finding, compare
+from poise.training.deploy.policy_check.rollout import Finding, compare_rollout
 from tests.support.policies import helper, write_graph, write_recurrent, write_yaml
 from tests.support.shared import robot
 
@@ -29,7 +29,7 @@ def found(place: Path, arrays: dict[str, Any], **fields: Any) -> dict[str, Findi
         "joints": list(robot("compact").joint_names),
         "observations": [{"term": "last_action"}], **fields})  # fmt: skip
     policy = PolicyFile(robot("compact"), controller_config(str(path)))
-    return {each.what: each for each in compare(policy, place / "rollout.npz")}
+    return {each.what: each for each in compare_rollout(policy, place / "rollout.npz")}
 
 
 @pytest.fixture

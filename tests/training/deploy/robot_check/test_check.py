@@ -20,7 +20,7 @@ from poise.envs.robots.robot import load_robot
 from poise.training.cli.entry import main
 from poise.training.deploy.robot_check import check as module
 from poise.training.deploy.robot_check.check import RobotCheck, check_robot
-from poise.training.deploy.robot_check.tables import print_check
+from poise.training.deploy.robot_check.tables import print_robot_check
 from poise.training.deploy.robot_check.uses import IN_PLACE, STEPPING, Uses
 from tests.support.small_biped import LEG, motors, write_biped
 from tests.support.small_urdf import INERTIAL, write_urdf
@@ -167,7 +167,7 @@ def shown(check: RobotCheck) -> str:
     console = Console(width=140, record=True, quiet=True)
     console.quiet = False
     with console.capture() as captured:
-        print_check(check, console)
+        print_robot_check(check, console)
     return captured.get()
 
 
@@ -305,3 +305,20 @@ def test_the_command_writes_the_description_of_a_model(
     assert main(["robot", str(path)]) == 0
     assert "poise: warning: " in (err := capsys.readouterr().err) and "guessed: root" in err
     assert Path("biped.yaml").read_text() == "mine"
+
+
+def test_motors_that_stand_but_hold_no_push_are_warned_of(
+    check: RobotCheck, tmp_path: Path, no_controllers: None
+) -> None:
+    """A sound robot recovers from half of its ankle limit in all directions; one whose motors have
+    a tenth of the torque stands, falls, and the motor is named."""
+    assert check.pushed.trials == 8 and check.pushed.falls == ()
+    limit = '<limit lower="-2" upper="2" effort="9" velocity="10"/><dynamics damping="0.3"/>'
+    weak = check_robot(write_urdf(tmp_path, limit=limit, armature={"*": 0.01}))
+    assert weak.both_feet.possible and not weak.rest.fallen
+    assert weak.pushed.falls and weak.pushed.cause.endswith("at its limit")
+    (fault,) = [each for each in weak.faults if each.kind == "pushed"]
+    assert f"falls in {len(weak.pushed.falls)} of 8 directions" in fault.text
+    console = Console(record=True, width=200)
+    print_robot_check(weak, console)
+    assert "pushed, 0.5 of the ankle limit" in console.export_text()

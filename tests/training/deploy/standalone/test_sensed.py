@@ -13,7 +13,6 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.measurement import RING
-from poise.envs.sensing.motors import STIFFNESS
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.deploy.standalone.readings import Measurement, Readings
@@ -40,7 +39,7 @@ def of_row(rings: object, k: int) -> Measurement:
 
 def evaluated(
     agent: Agent, steps: int
-) -> tuple[list[list[Measurement]], list[np.ndarray], Readings]:
+) -> tuple[list[list[Measurement]], list[MotorCommand], Readings]:
     """Measurements before each control tick of a pushed trial, and what motors were asked for."""
     env = agent.env
     observation, _ = env.reset(seed=3, options={"push": PUSH})
@@ -48,14 +47,15 @@ def evaluated(
         agent.begin()
     start = Readings.of_mujoco(env.data.qpos.copy(), env.data.qvel.copy())
     rings, motors = env.state_source.sensors.rings, env.state_source.motors
-    heard, asked, count = [[of_row(rings, (rings.next[0] + i) % RING) for i in range(RING)]], [], 0
+    heard, asked, count = [[of_row(rings, (rings.next + i) % RING) for i in range(RING)]], [], 0
     for _ in range(steps):
         env.set_action(agent.act(observation))
         for _ in range(getattr(env, "ticks", 1)):
-            count = int(rings.next[0])
+            count = rings.next
             env.tick()
-            asked.append(motors.asked[(motors.written[0] - 1) % RING].copy())
-            new = (int(rings.next[0]) - count) % RING
+            row = (motors.written - 1) % RING
+            asked.append(MotorCommand(*(each[row].copy() for each in motors.asked.members())))
+            new = (rings.next - count) % RING
             heard.append([of_row(rings, (count + i) % RING) for i in range(new)])
         assert not env.fallen
         observation = env.episode.observation.astype(np.float32)
@@ -104,7 +104,7 @@ def test_servos_and_the_other_estimator(make: Callable[[], Agent]) -> None:
     controller.reset(start, heard[0])
     for i, expected in enumerate(asked):
         np.testing.assert_array_equal(controller.command(heard[i] if i else ()), expected)
-    assert make is not whole or expected[STIFFNESS].all()
+    assert make is not whole or expected.stiffness.all()
 
 
 def standing(**fields: object) -> Measurement:

@@ -22,7 +22,7 @@ from rich.console import Console
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.schema import read_yaml, to_yaml
 from poise.training.benchmarking.evaluation.evaluate import evaluate
-from poise.training.cli.train import run as train_command
+from poise.training.cli.train import run_train as train_command
 from poise.training.learning.config import PPOConfig
 from poise.training.learning.policy_files import find_checkpoint
 from poise.training.learning.seeds import train as module

@@ -18,7 +18,12 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.training.benchmarking.trials import play as playing
 from poise.training.benchmarking.trials.agents import Agent
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.learning.tuning.candidates import Candidate, follow, play, worth
+from poise.training.learning.tuning.candidates import (
+    Candidate,
+    follow_limits,
+    worth,
+    worth_of_trials,
+)
 from poise.training.learning.tuning.gains import Gains
 from poise.training.learning.tuning.search import GAINS, HISTORY, tune, tune_config
 from poise.training.learning.tuning.tasks import TuneConfig, TuningPushes, TuningWalks
@@ -86,7 +91,7 @@ def test_pushes_surround_the_limits():
 def test_limits_follow_what_is_recovered():
     """Up where more than half is recovered, down where less; not quiet is not recovered."""
     values = np.array([[[1.0, 1.0], [1.0, 0.6], [0.3, 0.6]]])
-    found = follow(np.array([10.0, 20.0, 30.0]), values)
+    found = follow_limits(np.array([10.0, 20.0, 30.0]), values)
     np.testing.assert_allclose(found, [10.0 * np.exp(0.05), 20.0, 30.0 * np.exp(-0.05)])
 
 
@@ -134,13 +139,13 @@ def test_the_candidate_is_what_plays():
     data = to_dict(controller_config("momentum-qp"))
     config = small(pushes=TuningPushes(seconds=3.0), in_place=True)
     job = Candidate(0, config, data, (trial(8.0),))
-    assert play(job) == ([1.0], [])
+    assert worth_of_trials(job) == ([1.0], [])
     under = replace(config, policy="residual")
     policy = replace(job, config=under, alone=(), below=(trial(8.0), trial(40.0)))
-    alone, (won, lost) = play(policy)
+    alone, (won, lost) = worth_of_trials(policy)
     assert alone == [] and won == 1.0 and lost < 0.15
     data["torque"]["share"] = 0.05
-    assert play(replace(job, controller=data))[0][0] < 0.3
+    assert worth_of_trials(replace(job, controller=data))[0][0] < 0.3
 
 
 @pytest.mark.parametrize(
@@ -268,7 +273,7 @@ def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
         changed = {**data, "gait": {**data["gait"], **gait}}
         trials = tuple(walks.draw(3, robot(), walks.first(robot())))
         config = small(walks=replace(walks, seconds=9.0))
-        ((value,), below) = play(Candidate(0, config, changed, trials))
+        ((value,), below) = worth_of_trials(Candidate(0, config, changed, trials))
         assert below == []
         return value
 

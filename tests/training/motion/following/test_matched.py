@@ -10,14 +10,14 @@ import pytest
 
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.training.cli.entry import main
-from poise.training.motion.following.matched import parse_commands
+from poise.training.motion.following.matched import parse_timed_commands
 from tests.support.captured import captured
 
 TWO = ["humanoid_punch", "humanoid_walk"]
 
 
 def test_commands_hold_from_their_time_on() -> None:
-    asked = parse_commands(["1:1.2,0,0.5", "3:0.8"])
+    asked = parse_timed_commands(["1:1.2,0,0.5", "3:0.8"])
     assert asked(0.5) == (0.0, 0.0, 0.0)
     assert asked(1.0) == (1.2, 0.0, 0.5) and asked(2.99).forward == 1.2
     assert asked(9.0) == (0.8, 0.0, 0.0)

@@ -12,8 +12,8 @@ from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot
-from poise.training.motion.tracking.record import LANDING, LIFTED, Footing, Tracking, lies
-from poise.training.motion.tracking.reference import ReferenceBodies, Stance
+from poise.training.motion.tracking.record import LANDING, LIFTED, FeetRecord, Tracking, lies
+from poise.training.motion.tracking.reference import ReferenceBodies, SolePlaces
 from tests.support.physics import robot_named
 
 
@@ -24,7 +24,7 @@ def test_soles_elsewhere_move_the_legs_and_leave_the_rest() -> None:
     bodies, standing = ReferenceBodies(load_motion("standing", robot), robot), _standing(robot)
     turn = Rotation.from_euler("z", 40.0, degrees=True)
     moved = standing.points + [[0.03, 0.0, 0.0], [-0.03, 0.0, 0.0]]
-    stance = Stance(turn.apply(moved) + [1.0, 2.0, 0.0], turn.as_matrix() @ standing.axes,
+    stance = SolePlaces(turn.apply(moved) + [1.0, 2.0, 0.0], turn.as_matrix() @ standing.axes,
                     turn.apply([1.0, 0.0, 0.0])[:2])  # fmt: skip
     places, before = bodies.at(0.0, stance)[1], bodies.at(0.0, standing)[1]
     back = turn.inv().apply(places - [1.0, 2.0, 0.0])
@@ -62,14 +62,14 @@ def test_the_reference_s_bodies_are_those_of_standing() -> None:
     simulation = Simulation(robot)
     state, data = simulation.reset(robot.standing_qpos), simulation.data
     bodies = ReferenceBodies(load_motion("standing", robot), robot)
-    joints, places = bodies.at(0.3, Stance.of(state))
+    joints, places = bodies.at(0.3, SolePlaces.of(state))
     assert joints == pytest.approx(robot.standing_qpos[7:], abs=1e-9)
     assert np.abs(places - data.xpos[bodies.bodies]).max() < 1e-6
 
 
-def _standing(robot: Robot) -> Stance:
+def _standing(robot: Robot) -> SolePlaces:
     simulation = Simulation(robot)
-    return Stance.of(simulation.reset(robot.standing_qpos))
+    return SolePlaces.of(simulation.reset(robot.standing_qpos))
 
 
 def test_the_record_ends_after_the_motion_and_after_the_push() -> None:
@@ -77,11 +77,11 @@ def test_the_record_ends_after_the_motion_and_after_the_push() -> None:
     env = ResidualBalanceEnv(robot_named("humanoid"), pushes=None, duration=60.0)
     env.reset(seed=0)
     alone, pushed = Tracking(env), Tracking(env, [2.0])
-    env.simulation.clock[0] = round(3.98 / env.arrays.timestep)
+    env.simulation.clock.steps = round(3.98 / env.arrays.timestep)
     assert not alone.ended and not pushed.ended
-    env.simulation.clock[0] = round(4.0 / env.arrays.timestep)
+    env.simulation.clock.steps = round(4.0 / env.arrays.timestep)
     assert alone.ended and not pushed.ended
-    env.simulation.clock[0] = round(8.0 / env.arrays.timestep)
+    env.simulation.clock.steps = round(8.0 / env.arrays.timestep)
     assert pushed.ended
     assert np.isnan(alone.figures().body_error)  # no step was taken
 
@@ -92,10 +92,10 @@ def test_a_slide_is_measured_from_the_last_landing(
 ) -> None:
     """A step of 0.3 m is no slide, what the sole then creeps is; a sole that loses contact for less
     than 0.1 s has not stepped."""
-    monkeypatch.setattr(Stance, "of", lambda state: None)
+    monkeypatch.setattr(SolePlaces, "of", lambda state: None)
     both, points = np.ones(2), np.zeros((2, 3))
     state = cast(Any, SimpleNamespace(contacts=both, sole_points=points))
-    footing = Footing(state)
+    footing = FeetRecord(state)
     for _ in range(LANDING):
         footing.update(state)
     state.contacts = np.array([0.0, 1.0])

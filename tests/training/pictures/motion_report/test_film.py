@@ -11,7 +11,7 @@ import pytest
 from poise.baselines.balance.references.motion import load_motion
 from poise.training.cli.entry import main
 from poise.training.motion.following.follow import follow
-from poise.training.pictures.motion_report.film import Film
+from poise.training.pictures.motion_report.film import MotionFilm
 from poise.training.pictures.motion_report.performance import Watched
 from tests.support.physics import robot_named
 
@@ -28,7 +28,7 @@ def test_the_first_trial_is_filmed_and_the_ghost_goes_where_the_robot_is_pushed_
 ) -> None:
     robot, path, watched = robot_named("humanoid"), tmp_path / "squat.mp4", Watched()
     squat = load_motion("squat", robot)
-    with Film(path, (160, 120), watched) as film:
+    with MotionFilm(path, (160, 120), watched) as film:
         follow(squat, robot=robot, starts=2, impulse=60.0, speed=4.0, watch=film)
     assert len(watched.tracers) == 2
     reader = imageio_ffmpeg.read_frames(str(path))

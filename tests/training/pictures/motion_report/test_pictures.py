@@ -88,7 +88,7 @@ def test_a_timeline_has_a_row_for_each_layer_and_the_durations_of_transitions() 
     assert layers_of("any: thing") == ["any: thing"]
     part = {"enter": 0.0, "leave": 1.0, "wanted": True, "coefficient": None}
     physics = {"zmp_inside": 0.05, "torque": 0.7, "bent": True, "through_standing": False}
-    record = {"duration": 5.0, "played": [
+    record = {"duration": 5.0, "parts": [
         {**part, "what": "squat | punch on arms", "begins": 0.0, "ends": 2.0},
         {**part, "what": "physical", "begins": 2.0, "ends": 2.6, "coefficient": 1.0,
          "physics": physics},
@@ -101,7 +101,7 @@ def test_a_timeline_has_a_row_for_each_layer_and_the_durations_of_transitions() 
     assert "physical, 0.60 s, ZMP 5.0 cm inside, torque 70%, bent" in marks(out, "")
     words = [e.text for e in drawing(out.svg).iter("text")]
     assert {"base", "over 1", "squat", "punch on arms", "stand", "0.6"} <= set(words)
-    for wrong in ({}, {"played": [{}]}, {"played": "x", "duration": 1.0}, []):
+    for wrong in ({}, {"parts": [{}]}, {"parts": "x", "duration": 1.0}, []):
         with pytest.raises(ConfigError, match="holds no record of a script"):
             timeline_picture(wrong)
 

@@ -172,7 +172,7 @@ def test_without_a_mix_all_trials_count(tmp_path: Path, monkeypatch: pytest.Monk
     results = load_results(tmp_path / "out")
     assert results.summary["rated"] is None
     for name, entry in results.summary["controllers"].items():
-        assert entry["trials"] == len(results.of(name)) == entry["played"]
+        assert entry["trials"] == len(results.of(name)) == entry["evaluated"]
         assert entry["recovered"] == sum(r.recovered for r in results.of(name))
     (pair,) = results.summary["pairs"]
     assert pair["all"] is not None and pair["both"] == pair["all"]["both"]

@@ -17,7 +17,7 @@ from poise.training.benchmarking.trials.table import COLUMNS
 from poise.training.pictures.report import worst_trials
 from poise.training.pictures.report.worst_trials import (
     choose_exhibits,
-    film,
+    film_again,
     frame_times,
     signals_csv,
     smallest_lost,
@@ -76,7 +76,7 @@ def test_only_equal_pushes_are_compared(results: Results) -> None:
 def test_a_film_is_the_trial(results: Results) -> None:
     """Played again without pictures: it ends as recorded, and the signals say what happened."""
     lost = smallest_lost(results, "zero")[0]
-    played = film(results, lost, frame_times(lost), draw=False)
+    played = film_again(results, lost, frame_times(lost), draw=False)
     t, columns = played.signals.t, played.signals.columns
     assert played.same and not played.frames and t[0] == 0.0
     assert t[-1] == pytest.approx(lost.fall_time) and np.all(np.diff(t) > 0)
@@ -92,7 +92,7 @@ def test_frames_are_taken_at_their_times(results: Results) -> None:
     """From the push to the fall, each at most a policy step late, as pictures that show much."""
     lost = smallest_lost(results, "zero")[0]
     times = frame_times(lost)
-    frames = film(results, lost, times).frames
+    frames = film_again(results, lost, times).frames
     assert len(times) == worst_trials.FRAMES and times[0] == float(lost.line["start"])
     assert 1 < len(frames) <= len(times)
     for (time, picture), wanted in zip(frames, times, strict=False):

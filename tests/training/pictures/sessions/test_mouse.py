@@ -49,7 +49,7 @@ def test_the_push_is_the_arrow(simulation: Simulation) -> None:
     assert fields["impulse"] == pytest.approx(impulse, abs=0.01) and fields["body"] == "torso"
     (push,) = parse_pushes(fields, robot())
     row = pack([push], robot(), yaw)[0]
-    force, point = row[3:6], row[6:9]
+    force, point = row["force"], row["point"]
     assert np.allclose(force / np.linalg.norm(force), [0.0, 1.0, 0.0], atol=2e-3)
     body = simulation.model.body("torso").id
     rotation = simulation.data.xmat[body].reshape(3, 3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from poise.training.pictures.sessions.pace import BACKLOG, Pace
+from poise.training.pictures.sessions.pace import BACKLOG, RealTimePace
 
 PERIOD = 0.02
 
@@ -22,7 +22,7 @@ class Clock:
 def test_steps_come_in_real_time() -> None:
     """However the calls lie: 10 s of the clock are 500 steps."""
     clock = Clock()
-    pace, count = Pace(clock), 0
+    pace, count = RealTimePace(clock), 0
     for k in range(1000):
         clock.now += 0.003 if k % 2 else 0.017
         count += pace.due(PERIOD)
@@ -33,7 +33,7 @@ def test_steps_come_in_real_time() -> None:
 def test_slow_motion_is_fewer_steps() -> None:
     """A quarter of them at a quarter of the speed; that is not slow in the sense of the factor."""
     clock = Clock()
-    pace, count = Pace(clock), 0
+    pace, count = RealTimePace(clock), 0
     pace.speed = 0.25
     for _ in range(1000):
         clock.now += 0.01
@@ -45,7 +45,7 @@ def test_slow_motion_is_fewer_steps() -> None:
 def test_what_is_too_late_is_given_up_and_counted() -> None:
     """Steps that take twice as long as they should: half of real time, and no growing debt."""
     clock = Clock()
-    pace, most = Pace(clock), 0
+    pace, most = RealTimePace(clock), 0
     for _ in range(200):
         most = max(most, count := pace.due(PERIOD))
         clock.now += max(2 * PERIOD * count, 0.001)
@@ -57,7 +57,7 @@ def test_what_is_too_late_is_given_up_and_counted() -> None:
 def test_a_pause_does_not_count() -> None:
     """Time at rest is neither owed nor late."""
     clock = Clock()
-    pace = Pace(clock)
+    pace = RealTimePace(clock)
     clock.now += 60.0
     pace.rest()
     assert pace.due(PERIOD) == 0 and pace.wanted == 0.0 and pace.total == 1.0

@@ -17,7 +17,7 @@ from poise.envs.physics.pushes.push import Push
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.pictures.sessions.frames import VALUES, Frame, between
+from poise.training.pictures.sessions.frames import VALUES, Frame, frame_between
 from poise.training.pictures.sessions.live import KEPT, Live
 from poise.training.pictures.sessions.loading import read_mapping
 from poise.training.pictures.sessions.session import Session, load_session
@@ -73,7 +73,7 @@ def test_all_sides_meet_the_same_push(session: Session) -> None:
     push = session.push(**SMALL, point=[0.0, 0.0, 0.1])
     assert push == Push("torso", 0.1, 0.1, 12.0, 70.0, point=(0.0, 0.0, 0.1))
     tables = [side.env.simulation.push_table for side in session.sides]
-    assert np.array_equal(*tables) and np.count_nonzero(tables[0][:, 2]) == 1
+    assert np.array_equal(*tables) and np.count_nonzero(tables[0]["duration"]) == 1
 
 
 def test_directions_are_those_of_the_start(session: Session) -> None:
@@ -83,7 +83,7 @@ def test_directions_are_those_of_the_start(session: Session) -> None:
     simulation = session.sides[0].env.simulation
     simulation.state_arrays.heading[:] = [0.0, 1.0]  # as if it had turned by 90°
     session.push(**{**SMALL, "direction": 0.0})
-    force = simulation.push_table[0, 3:6]
+    force = simulation.push_table["force"][0]
     assert force @ [np.cos(simulation.start_yaw), np.sin(simulation.start_yaw), 0.0] > 100.0
 
 
@@ -155,13 +155,13 @@ def test_slow_motion_is_between_two_frames(session: Session) -> None:
     first, second = live.history[-2][0], live.history[-1][0]
     other = first._replace(quaternions=-first.quaternions)  # the same turns
     for start in (first, other):
-        middle = between(start, second, 0.5)
+        middle = frame_between(start, second, 0.5)
         assert np.allclose(middle.positions, 0.5 * (first.positions + second.positions))
         cosines = [np.sum(middle.quaternions * f.quaternions, axis=1) for f in (first, second)]
         assert np.allclose(np.abs(cosines[0]), np.abs(cosines[1])) and np.min(cosines[1]) > 0.98
         assert np.allclose(np.linalg.norm(middle.quaternions, axis=1), 1.0)
-    assert np.allclose(between(first, second, 0.0).positions, first.positions)
-    assert np.array_equal(between(first, second, 1.0).quaternions.round(12),
+    assert np.allclose(frame_between(first, second, 0.0).positions, first.positions)
+    assert np.array_equal(frame_between(first, second, 1.0).quaternions.round(12),
                           second.quaternions.round(12))  # fmt: skip
 
 
@@ -314,6 +314,6 @@ def test_the_ghost_is_the_reference() -> None:
         assert np.allclose(turn @ sole.rotation, wanted, atol=1e-4)
     apart = np.linalg.norm(frame.positions - frame.ghost.positions, axis=1)[1:]
     assert 1e-4 < apart.max() < 0.06  # it is followed, not copied
-    between_two = between(live.history[-2][0], frame, 0.5).ghost
+    between_two = frame_between(live.history[-2][0], frame, 0.5).ghost
     before = live.history[-2][0].ghost
     assert np.allclose(2.0 * between_two.positions, before.positions + frame.ghost.positions)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from poise.training.cli.entry import main
-from poise.training.pictures.sessions.walk import walk
+from poise.training.pictures.sessions.walk import play_walk
 
 
 def test_a_walk_is_told_in_lines(capsys: pytest.CaptureFixture[str]) -> None:
@@ -41,7 +41,7 @@ def test_a_fall_is_told(tmp_path: Path) -> None:
     """A push that nothing holds: when it fell; a video of it is written."""
     told: list[str] = []
     path = tmp_path / "walk.webp"
-    outcome = walk(
+    outcome = play_walk(
         {"ahead": 0.3}, duration=4.0, push="90@90", push_at=0.5, video=path, say=told.append
     )
     assert outcome.fallen and f"fell after {outcome.fall_time:.1f} s" in told

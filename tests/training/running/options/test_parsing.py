@@ -30,7 +30,7 @@ def test_what_is_read_is_called_later() -> None:
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        ([], "mine: needs --out STR"),
+        ([], "mine: needs --out NAME"),
         (["--out", "a", "--sede", "1"], "mine: --sede: no such option, did you mean --seed? "),
         (["--out", "a", "--zzz"], "mine: --zzz: no such option; poise mine --help lists them"),
         (["--out", "a", "b"], "mine: takes no 'b': see poise mine --help"),

@@ -6,9 +6,8 @@ import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import PoiseError
-from poise.envs.balance import episode
 from poise.envs.robots.robot import Robot
-from poise.training.benchmarking.trials.play import TINY, lean
+from poise.training.benchmarking.trials.play import TINY, tilt_of
 
 CONTROLLER = "momentum-qp"
 DURATION = 2.0  # [s]
@@ -52,13 +51,13 @@ def stand_at_rest(robot: Robot) -> Rest:
     env.reset(seed=0)
     metrics, start = env.episode.metrics, _places(env)
     drift, half = np.zeros(len(start)), np.zeros(2)
-    while env.episode.running[0]:
+    while env.episode.running:
         env.step_without_info(np.zeros(env.action_space.shape))
         drift = np.maximum(drift, np.linalg.norm(_places(env) - start, axis=1))
         if env.simulation.time <= 0.5 * DURATION:
-            half = metrics[[episode.TORQUE_VARIATION, episode.TORQUE_TIME]].copy()
+            half = np.array([metrics.torque_variation, metrics.torque_time])
             start, drift = _places(env), np.zeros(len(start))
-    change = metrics[[episode.TORQUE_VARIATION, episode.TORQUE_TIME]] - half
+    change = np.array([metrics.torque_variation, metrics.torque_time]) - half
     if change[1] < TINY:  # it fell in the first half
         change += half
     return Rest(
@@ -67,9 +66,9 @@ def stand_at_rest(robot: Robot) -> Rest:
         chatter=float(change[0] / max(change[1], TINY)),
         com_drift=float(drift[0]),
         foot_drift=float(drift[1:].max()),
-        lean=lean(env),
-        unsolved=int(metrics[episode.FAILURES]),
-        ticks=int(metrics[episode.TICKS]),
+        lean=tilt_of(env),
+        unsolved=int(metrics.failures),
+        ticks=int(metrics.ticks),
     )
 
 

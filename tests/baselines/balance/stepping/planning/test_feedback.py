@@ -1,5 +1,7 @@
 """The law that feeds the body's lean and turn back to a step."""
 
+from dataclasses import fields
+
 import mujoco
 import numpy as np
 import pytest
@@ -14,10 +16,6 @@ from poise.baselines.balance.stepping.planning.config import (
     StepFeedback,
 )
 from poise.baselines.balance.stepping.planning.feedback import (
-    LATER_STEP,
-    PHASE,
-    STANCE,
-    SWING,
     evaluate_feedback,
     pivot_offset,
     schedule_gains,
@@ -39,7 +37,7 @@ def signals(simulation, side=1.0, yaw=YAW):
     """What is read beside the second sole."""
     f, state = arrays_of(simulation.robot, StepFeedback(), {}), simulation.state
     evaluate_feedback(f, state.arrays, state.sole_points[1], np.cos(yaw), np.sin(yaw), side)
-    return dict(zip(SIGNALS, f.signals.copy(), strict=True))
+    return dict(zip(SIGNALS, f.signals.values, strict=True))
 
 
 def turned(ahead=0.0, left=0.0):
@@ -98,13 +96,13 @@ def test_what_is_added_fits_the_robot(name):
     """Lengths in h, times in 1/ω; a row adds up its gains times the signals."""
     r, row = robot(name), SignalGains(constant=0.1, later_step=0.2, phase=0.3, lean_ahead=1.0)
     f = arrays_of(r, StepFeedback(row, row, row, row), {})
-    f.signals[[LATER_STEP, PHASE]] = 1.0, 0.5
+    f.signals.later_step, f.signals.phase = 1.0, 0.5
     state = generic_state(name, seed=1).state
     evaluate_feedback(f, state.arrays, state.sole_points[0], np.cos(YAW), np.sin(YAW), 1.0)
-    expected = 0.1 + 0.2 + 0.15 + f.signals[SIGNALS.index("lean_ahead")]
+    expected = 0.1 + 0.2 + 0.15 + f.signals.lean_ahead
     h = r.height_com
     units = np.array([h, h, np.sqrt(h / -r.model.opt.gravity[2]), h])
-    np.testing.assert_allclose(f.added, expected * units, rtol=1e-12)
+    np.testing.assert_allclose(f.added.values, expected * units, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -122,10 +120,10 @@ def test_gains_are_linear_between_the_angles_of_falls(angle, expected):
     f = arrays_of(r, StepFeedback(SignalGains(lean_ahead=1.0, phase=0.3)), falls)
     for side in (1.0, -1.0):
         speed = 0.7 * np.array([np.cos(np.radians(angle)), side * np.sin(np.radians(angle))])
-        f.signals[LATER_STEP] = 1.0
+        f.signals.later_step = 1.0
         schedule_gains(f, *speed)
         np.testing.assert_array_equal(f.gains, f.always)  # further steps
-        f.signals[LATER_STEP] = 0.0
+        f.signals.later_step = 0.0
         schedule_gains(f, *speed)
         gains = dict(zip(SIGNALS, f.gains[0] / r.height_com, strict=True))
         assert gains.pop("lean_ahead") == pytest.approx(expected, rel=1e-12)
@@ -134,12 +132,13 @@ def test_gains_are_linear_between_the_angles_of_falls(angle, expected):
 
 
 def test_each_signal_has_its_index():
-    """The kernels' names of the columns of K are those of the YAML files."""
+    """The kernels' names of signals and changes are those of the YAML files, in their order."""
+    assert tuple(feedback.Signals.mutable) == SIGNALS
+    assert tuple(feedback.Changes.mutable) == tuple(item.name for item in fields(StepFeedback))
+    f = arrays_of(robot(), StepFeedback(), {})
     for k, name in enumerate(SIGNALS):
-        assert getattr(feedback, name.upper()) == k
-    rows = StepFeedback(*(SignalGains(constant=value) for value in (1.0, 2.0, 3.0, 4.0)))
-    for name, value in (("ahead", 1.0), ("outward", 2.0), ("time", 3.0), ("height", 4.0)):
-        assert rows.matrix()[getattr(feedback, name.upper()), feedback.CONSTANT] == value
+        setattr(f.signals, name, 1.0 + k)
+    assert f.signals.values.tolist() == [1.0 + k for k in range(len(SIGNALS))]
 
 
 @pytest.mark.parametrize(
@@ -173,7 +172,7 @@ def test_the_force_passes_the_com_where_it_rights_the_trunk():
     mujoco.mju_rotVecQuat(e, upright[1], data.qpos[3:7])
     gains = PivotGains(momentum=0.8, lean=-0.3)
     f = arrays_of(r, StepFeedback(), {}, PivotConfig(swing=gains, lateral_fraction=0.5))
-    found = pivot_offset(f, state.arrays, SWING, np.cos(YAW), np.sin(YAW))
+    found = pivot_offset(f, state.arrays, f.swing, np.cos(YAW), np.sin(YAW))
     turning = 0.8 * omega / (r.mass * -r.model.opt.gravity[2]) * np.array([y, -x])
     wanted = turning - 0.3 * h * e[:2]
     ahead = np.array([np.cos(YAW), np.sin(YAW)])
@@ -191,7 +190,7 @@ def test_such_a_force_takes_the_turn_back():
     omega = np.sqrt(9.81 / h)
     pivot = PivotConfig(stance=PivotGains(momentum=k))
     f = arrays_of(r, StepFeedback(), {}, pivot)
-    x, y = pivot_offset(f, state.arrays, STANCE, np.cos(YAW), np.sin(YAW))
+    x, y = pivot_offset(f, state.arrays, f.stance, np.cos(YAW), np.sin(YAW))
     p = np.array([0.1, 0.05, -h])  # of the CoP from the CoM
     force = r.mass * omega**2 * (np.array([x, y, 0.0]) - p)
     force[2] = weight

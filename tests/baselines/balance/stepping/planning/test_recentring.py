@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.planning.blocks import BEST_COST, BEST_TIME, BEST_X, BEST_Y
-from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import (
     BOUNCE_TIME,
     INACTIVE,
@@ -67,9 +65,9 @@ def test_the_next_push_meets_a_first_step():
     """At home and calm nothing is left of the steps before, but their count."""
     _, env = play(0.0)
     assert env.controller.steps > 1
-    assert env.controller.memory.recovering[0] == 0
+    assert env.controller.memory.recovering == 0
     _, env = play(0.0, home=False)
-    assert env.controller.memory.recovering[0] == 1
+    assert env.controller.memory.recovering == 1
 
 
 def test_a_push_on_the_way_home_is_caught():
@@ -77,14 +75,14 @@ def test_a_push_on_the_way_home_is_caught():
     begun = []
 
     def look(env):
-        if env.controller.recentring.stage[0] == SWINGING:
+        if env.controller.recentring.stage == SWINGING:
             begun.append(env.simulation.time)
 
     play(0.0, watch=look)
     stages = []
 
     def watch(env):
-        stages.append((env.simulation.time, int(env.controller.recentring.stage[0])))
+        stages.append((env.simulation.time, int(env.controller.recentring.stage)))
 
     second = {"impulse": 20.0, "direction": 150.0, "start": begun[0] + 0.04, "body": "torso"}
     fallen, env = play(0.0, later=[second], watch=watch, duration=6.5)
@@ -113,7 +111,7 @@ def test_foothold_home(shift):
     )
     q = planner.search(state)
     q.heading[:] = 1.0, 0.0
-    recentring.foot[0], q.feedback.signals[LATER_STEP] = 1, 1.0
+    recentring.foot, q.feedback.signals.later_step = 1, 1.0
     plan_recentring(q, recentring)
     stance, foot = state.sole_points[:, :2]
     readers = readable.ReadablePlanner(planner)
@@ -128,8 +126,8 @@ def test_foothold_home(shift):
         outside = readable.beyond(controller.region, stance, wanted, 0.0, end)
         if outside < -controller.config.recentring.margin * controller.robot.height_com:
             break
-    np.testing.assert_allclose(q.best[[BEST_X, BEST_Y]], wanted, atol=1e-9)
-    np.testing.assert_allclose(q.best[[BEST_TIME, BEST_COST]], [time, outside], atol=1e-9)
+    np.testing.assert_allclose([q.best_x, q.best_y], wanted, atol=1e-9)
+    np.testing.assert_allclose([q.best_time, q.best_cost], [time, outside], atol=1e-9)
     if shift == (0.0, 0.06):
         np.testing.assert_allclose(wanted, rest)  # home itself
     if shift == (0.3, 0.3):
@@ -143,13 +141,13 @@ def test_the_pressure_stays_near_a_foot_that_came_home():
     env.reset(seed=0)
     t = controller.tick(env.simulation.state, env.targets)
     xi, h = t.state.capture_point, controller.robot.height_com
-    t.recentring.stage[0] = LOADING
+    t.recentring.stage = LOADING
     p = np.array([xi[0] + 0.3, xi[1] - 0.4])
     limit_cop_distance(t, xi[0] + 0.1, xi[1], p)
     np.testing.assert_allclose(p - xi[:2], 0.05 * h * np.array([0.6, -0.8]), atol=1e-12)
-    assert t.recentring.stage[0] == LOADING
+    assert t.recentring.stage == LOADING
     limit_cop_distance(t, xi[0] + 0.01 * h, xi[1], p)
-    assert t.recentring.stage[0] == INACTIVE
+    assert t.recentring.stage == INACTIVE
 
 
 def test_a_foot_that_slipped_is_lowered():
@@ -160,9 +158,9 @@ def test_a_foot_that_slipped_is_lowered():
     t = controller.tick(env.simulation.state, env.targets)
     ticks = int(np.ceil(SLIP_TIME / controller.period)) + 1
     t.state.contacts[:] = 1.0, 0.0
-    t.memory.clock[0] = 0.5 * BOUNCE_TIME
+    t.memory.clock = 0.5 * BOUNCE_TIME
     assert all(slipped_foot(t) < 0 for _ in range(2 * ticks))
-    t.memory.clock[0] = 2.0 * BOUNCE_TIME
+    t.memory.clock = 2.0 * BOUNCE_TIME
     found = [slipped_foot(t) for _ in range(ticks)]
     assert found[-1] == 1 and set(found[:-2]) == {-1}
     t.state.contacts[1] = 1.0
@@ -190,9 +188,9 @@ def test_where_the_weight_goes_before_a_step_home(direction):
         controller.robot.height_com,
     )
     shift_weight(t)
-    soles, foot = state.sole_points[:, :2], t.recentring.foot[0]
+    soles, foot = state.sole_points[:, :2], t.recentring.foot
     distances = np.linalg.norm(soles - state.capture_point, axis=1)
-    assert t.recentring.stage[0] == SHIFTING and foot == np.argmax(distances)
+    assert t.recentring.stage == SHIFTING and foot == np.argmax(distances)
     ahead = t.state.sole_axes[1 - foot, :2, 0]
     ahead = ahead / np.linalg.norm(ahead)
     home = controller.recentring.nominal * (1.0 if foot == 0 else -1.0)
@@ -212,7 +210,7 @@ def test_weight_goes_to_one_foot_before_the_other_lifts_off():
 
     def watch(env):
         recentring = env.controller.recentring
-        if recentring.stage[0] == SHIFTING:
+        if recentring.stage == SHIFTING:
             xi = env.simulation.state.capture_point
             seen.append(np.linalg.norm(xi - recentring.capture_target))
 

@@ -22,8 +22,8 @@ def way(moves=(), duration=0.3, after=0.05):
     swing = swing_at(np.array([0.1, 0.2, 0.0]), duration, SwingTask(), UNITS)
     planned.aim(swing, np.array([0.5, 0.2]))
     rows, moves = [swing.reference.copy()], list(moves)
-    while swing.time[0] < swing.duration[0] + after:
-        if moves and swing.time[0] >= moves[0][0]:
+    while swing.time < swing.duration + after:
+        if moves and swing.time >= moves[0][0]:
             planned.aim(swing, *moves.pop(0)[1:])
         rows.append(planned.advance(swing, DT))
     return np.array(rows), swing
@@ -63,7 +63,7 @@ def test_the_way_is_that_of_the_readable_form():
     """Every tick's reference follows from the last one: to the apex, down, and on."""
     swing = swing_at(np.array([0.1, 0.2, 0.01]), 0.3, SwingTask(), UNITS)
     planned.aim(swing, np.array([0.5, 0.1]))
-    while swing.time[0] < 0.34:
+    while swing.time < 0.34:
         expected = readable.advanced(swing, DT)
         np.testing.assert_allclose(planned.advance(swing, DT), expected, rtol=1e-9, atol=1e-9)
 
@@ -86,7 +86,7 @@ def test_foot_clears_the_ground_and_lands_where_it_should():
     moved = np.array([0.45, 0.3])
     rows, swing = way(((0.1, moved, 0.35),), after=0.0)
     assert rows[:, 0, 2].max() == pytest.approx(SwingTask().clearance * HEIGHT, rel=0.05)
-    assert swing.time[0] == pytest.approx(0.35, abs=1.5 * DT)
+    assert swing.time == pytest.approx(0.35, abs=1.5 * DT)
     np.testing.assert_allclose(rows[-1, 0, :2], moved, atol=1e-6)
     assert abs(rows[-1, 0, 2]) < 0.01 and rows[-1, 1, 2] < 0.0
 

@@ -13,7 +13,7 @@ from poise.baselines.motion.clips.rotations import angle_between, exp, from_scip
 from poise.baselines.motion.graphs.joining.joins import (
     JOINS,
     capture,
-    cross,
+    cross_fade,
     faced_like,
     hermite,
     insert,
@@ -157,11 +157,11 @@ def test_cross_is_linear_on_request(clips: tuple[Clip, Clip]) -> None:
     first = [part(clip, slice(i, i + 1)) for clip, i in zip(clips, (0, 60), strict=True)]
     still = [replace(c, root=c.root.repeat(40, 0), rotations=c.rotations.repeat(40, 0))
              for c in first]  # fmt: skip
-    whole = cross(*still, 20 * still[0].dt, "linear")
+    whole = cross_fade(*still, 20 * still[0].dt, "linear")
     steps = angle_between(whole.rotations[19:39], whole.rotations[20:40])
     assert np.ptp(steps, axis=0).max() < 1e-7
     assert steps.max() > 1e-3
-    smooth = cross(*still, 20 * still[0].dt)
+    smooth = cross_fade(*still, 20 * still[0].dt)
     assert angle_between(smooth.rotations[19], smooth.rotations[20]).max() < 0.1 * steps.max()
 
 
@@ -170,7 +170,7 @@ def test_errors_name_the_kind(clips: tuple[Clip, Clip]) -> None:
     with pytest.raises(ConfigError, match=r"insert: must last 2 frames, 0\.0667 s, or longer"):
         insert(a, b, 0.01)
     with pytest.raises(ConfigError, match="cross: lasts 100 s, longer than a clip"):
-        cross(a, b, 100.0)
+        cross_fade(a, b, 100.0)
     other = replace(a, skeleton=replace(a.skeleton, offsets=2.0 * a.skeleton.offsets))
     with pytest.raises(ConfigError, match="capture: .* has another skeleton than"):
         capture(a, other, 0.5)

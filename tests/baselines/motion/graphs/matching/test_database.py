@@ -7,8 +7,8 @@ import pytest
 
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.graphs.matching.database import MatchingDatabase
-from poise.baselines.motion.graphs.matching.features import clip_features, groups
-from poise.baselines.motion.graphs.matching.player import Command
+from poise.baselines.motion.graphs.matching.features import clip_features, feature_groups
+from poise.baselines.motion.graphs.matching.player import PlayerCommand
 from poise.configs.errors import ConfigError
 from tests.support.motion_files import matching_clips
 
@@ -27,11 +27,11 @@ def database(clips: list[Clip]) -> MatchingDatabase:
 
 def test_groups_of_equal_weight_vary_alike(clips: list[Clip]) -> None:
     """The squares of a group's deviations add up to about w²."""
-    names = [group.name for group in groups()]
+    names = [group.name for group in feature_groups()]
     database = MatchingDatabase(clips, weights={**dict.fromkeys(names, 1.0), "limbs": 2.0})
     spread, begin = database.values.std(axis=0), 0
     assert database.values.mean(axis=0) == pytest.approx(0.0, abs=1e-9)
-    for group in groups():
+    for group in feature_groups():
         whole = spread[begin : begin + group.size].mean() * np.sqrt(group.size)
         assert whole == pytest.approx(2.0 if group.name == "limbs" else 1.0)
         begin += group.size
@@ -42,7 +42,7 @@ def test_matches_are_those_of_brute_force(database: MatchingDatabase) -> None:
     for _ in range(200):
         clip = int(RNG.integers(len(database.clips)))
         frame = int(RNG.integers(len(database.clips[clip])))
-        command = Command(*RNG.uniform(-1.5, 1.5, 3))
+        command = PlayerCommand(*RNG.uniform(-1.5, 1.5, 3))
         query = database.query(clip, frame, command.future(database.ahead))
         found = database.nearest(query)
         distances = np.linalg.norm(database.values[database.entries] - query, axis=1)
@@ -64,9 +64,9 @@ def test_a_frame_with_its_own_future_is_found(database: MatchingDatabase) -> Non
 
 def test_weights_choose_what_counts(clips: list[Clip]) -> None:
     """With only the place ahead, a frame that gets there is found, whatever the posture."""
-    only = dict.fromkeys((group.name for group in groups()), 0.0)
+    only = dict.fromkeys((group.name for group in feature_groups()), 0.0)
     database = MatchingDatabase(clips, weights={**only, "place@1": 1.0})
-    found = database.nearest(database.query(0, 0, Command(0.4).future(database.ahead)))
+    found = database.nearest(database.query(0, 0, PlayerCommand(0.4).future(database.ahead)))
     assert database.clips[found.clip].name == "humanoid_walk"
     place = clip_features(database.clips[found.clip], database.ahead)[found.frame, -4:-2]
     assert place == pytest.approx([0.4, 0.0], abs=0.05)

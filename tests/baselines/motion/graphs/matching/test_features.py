@@ -10,7 +10,7 @@ from poise.baselines.motion.graphs.matching.features import (
     FUTURE,
     LIMBS,
     clip_features,
-    groups,
+    feature_groups,
     seen_from,
     steady_heading,
 )
@@ -26,7 +26,7 @@ def walk() -> Clip:
 
 def columns(table: np.ndarray, name: str) -> np.ndarray:
     begin = 0
-    for group in groups(AHEAD):
+    for group in feature_groups(AHEAD):
         if group.name == name:
             return table[:, begin : begin + group.size]
         begin += group.size
@@ -40,11 +40,11 @@ def test_turned_and_moved_clips_have_the_same_features(walk: Clip) -> None:
 
 def test_every_column_has_a_group(walk: Clip) -> None:
     table = clip_features(walk, AHEAD)
-    assert table.shape == (len(walk), sum(group.size for group in groups(AHEAD)))
-    assert [group.name for group in groups(AHEAD)][-4:] == [
+    assert table.shape == (len(walk), sum(group.size for group in feature_groups(AHEAD)))
+    assert [group.name for group in feature_groups(AHEAD)][-4:] == [
         "place@0.2", "direction@0.2", "place@0.5", "direction@0.5",
     ]  # fmt: skip
-    assert len(groups(AHEAD)) == 5 + len(AHEAD) * len(FUTURE)
+    assert len(feature_groups(AHEAD)) == 5 + len(AHEAD) * len(FUTURE)
 
 
 def test_velocities_are_seen_from_the_facing_frame(walk: Clip) -> None:

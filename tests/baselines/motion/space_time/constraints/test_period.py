@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from poise.baselines.motion.space_time.constraints.constraint import Period, When, frames_of
+from poise.baselines.motion.space_time.constraints.constraint import Period, When, period_frames
 from poise.configs.errors import ConfigError
 from tests.support.scenes import DT, LEAD, swaying
 
@@ -27,7 +27,7 @@ def test_frames(period: Period, first: int, last: int) -> None:
     scene = swaying()
     assert scene.duration == pytest.approx(12 * DT)
     scene.planted[FIRST + 5 :, scene.sides["left"]] = False
-    frames = frames_of(period, scene)
+    frames = period_frames(period, scene)
     assert frames.tolist() == list(range(FIRST + first, FIRST + last + 1))
 
 
@@ -41,12 +41,12 @@ def test_what_has_no_frames() -> None:
         (When(contact="left"), "period.contact: the feet 'left' are never planted"),
     ):
         with pytest.raises(ConfigError, match=text):
-            frames_of(period, scene)
+            period_frames(period, scene)
 
 
 def test_frames_of_a_part() -> None:
     """Of every third frame: the nearest one to a time is among them."""
     part = swaying().part(np.arange(0, 25, 3))
     assert part.dt == pytest.approx(3 * DT)
-    assert frames_of(When(at=0.2), part).tolist() == [4]
-    assert frames_of((0.1, 0.2), part).tolist() == [3, 4]
+    assert period_frames(When(at=0.2), part).tolist() == [4]
+    assert period_frames((0.1, 0.2), part).tolist() == [3, 4]

@@ -9,7 +9,7 @@ from poise.baselines.motion.space_time.constraints.constraint import (
     check_constraints,
     read_constraints,
 )
-from poise.baselines.motion.space_time.constraints.points import Reach
+from poise.baselines.motion.space_time.constraints.points import PointReach
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from tests.support.scenes import swaying
@@ -22,7 +22,7 @@ def test_what_a_file_says(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text(f"{HEAD}{REACH}, period: {{at: 0.2}}, weight: 2}}\n")
     found = read_constraints(path)
-    wanted = Reach(point="hand_left", place=(0.1, None, 1.0), period=When(at=0.2), weight=2.0)
+    wanted = PointReach(point="hand_left", place=(0.1, None, 1.0), period=When(at=0.2), weight=2.0)
     assert found == (wanted,)
     check_constraints(found, swaying(), path)
 

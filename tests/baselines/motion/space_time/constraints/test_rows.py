@@ -13,18 +13,18 @@ from poise.baselines.motion.space_time.constraints.points import (
     Height,
     Keep,
     OverSupport,
-    Reach,
+    PointReach,
     Speed,
 )
-from poise.baselines.motion.space_time.constraints.scene import Rows, Scene
+from poise.baselines.motion.space_time.constraints.scene import ConstraintRows, Scene
 from poise.baselines.motion.space_time.constraints.touch import Touch
 from tests.support.scenes import swaying
 
 ALL = (
     Keep(point="hand_left"),
     Keep(point="hand_right", to="chest", within=0.01),
-    Reach(point="hand_left", place=(0.3, None, 1.2)),
-    Reach(point="com", place=(0.0, 0.0, 0.9), to="feet"),
+    PointReach(point="hand_left", place=(0.3, None, 1.2)),
+    PointReach(point="com", place=(0.0, 0.0, 0.9), to="feet"),
     OverSupport(margin=0.03),
     Height(point="pelvis", least=0.6, most=0.7),
     Speed(point="elbow_right", most=0.2),
@@ -35,7 +35,7 @@ ALL = (
 )
 
 
-def rows_at(constraint: Constraint, scene: Scene, frame: int) -> list[Rows]:
+def rows_at(constraint: Constraint, scene: Scene, frame: int) -> list[ConstraintRows]:
     return list(constraint.rows(scene, [frame]))
 
 
@@ -78,7 +78,7 @@ def test_violations_in_their_units() -> None:
         for f in inside
     ]
     left = np.array([pair[0] for pair in hands])
-    missed = violation(Reach(point="hand_left", place=(None, None, 1.2), within=0.01), scene)
+    missed = violation(PointReach(point="hand_left", place=(None, None, 1.2), within=0.01), scene)
     assert missed.largest == pytest.approx(np.abs(left[:, 2] - 1.2).max() - 0.01)
     assert missed.unit == "m" and not missed.holds
     assert scene.times[inside[int(np.abs(left[:, 2] - 1.2).argmax())]] == missed.time

@@ -13,7 +13,12 @@ import pytest
 
 from poise.baselines.motion.synthesis.scripts.library import find_script, names_script
 from poise.baselines.motion.synthesis.scripts.parser import parse, read_script
-from poise.baselines.motion.synthesis.scripts.printer import plain, table_of, text_of, to_csv
+from poise.baselines.motion.synthesis.scripts.printer import (
+    table_of,
+    text_of,
+    to_csv,
+    without_brackets,
+)
 from poise.baselines.motion.synthesis.scripts.table import read_table, text_of_table
 from poise.baselines.motion.synthesis.scripts.tree import (
     Arrow,
@@ -21,7 +26,7 @@ from poise.baselines.motion.synthesis.scripts.tree import (
     Define,
     Modifier,
     Script,
-    Term,
+    ScriptTerm,
     clip_names,
 )
 from poise.configs.errors import ConfigError
@@ -61,7 +66,7 @@ def test_all_that_the_grammar_has() -> None:
     first, cut, both, last = (o.terms[0] for o in script.sequence.overlays)
     assert first.body.name == last.body.name == "stand"
     assert cut.modifiers == (Modifier("[", (0.5, 2.0)), Modifier("@", (1.5,)), Modifier("mirrored"))
-    assert both == Term(ClipName("both"), (Modifier("*", (2.0,)),))
+    assert both == ScriptTerm(ClipName("both"), (Modifier("*", (2.0,)),))
     assert script.sequence.arrows == (
         Arrow(), Arrow("cross", (("duration", 0.4),)), Arrow("insert", (("duration", 1.0),)),
     )  # fmt: skip
@@ -71,7 +76,7 @@ def test_all_that_the_grammar_has() -> None:
 
 def test_overlay_binds_tighter_than_the_arrow() -> None:
     assert len(parse("a -> b | c -> d").sequence.overlays) == 3
-    assert parse("a -> b | c -> d") == plain(parse("a -> (b | c) -> d"))
+    assert parse("a -> b | c -> d") == without_brackets(parse("a -> (b | c) -> d"))
     assert parse("a -> b | c -> d") != parse("a -> (b | c) -> d")
 
 
@@ -93,7 +98,7 @@ def script_of(rows: list[list[str]]) -> Script:
 def test_random_scripts_as_tables_and_back() -> None:
     rng, wide = np.random.default_rng(1), 0
     for _ in range(200):
-        script = plain(random_script(rng))
+        script = without_brackets(random_script(rng))
         rows = table_of(script)
         wide += len(rows) > 3
         assert script_of(rows) == script
@@ -113,7 +118,8 @@ def grammar() -> pp.ParserElement:
     words = pp.Keyword("on") + name + pp.ZeroOrMore("," + name) | pp.Keyword("mirrored")
     signs = pp.one_of("* @") + number | "[" + number + ":" + number + "]"
     modifier = words | pp.Keyword("weight") + number | signs
-    term = (text | name | "<" + name + ">" | "(" + sequence + ")") + pp.ZeroOrMore(modifier)
+    state = "<" + (text | name) + pp.Optional("@" + number) + ">"
+    term = (text | name | state | "(" + sequence + ")") + pp.ZeroOrMore(modifier)
     overlay = term + pp.ZeroOrMore("|" + term)
     sequence <<= overlay + pp.ZeroOrMore(arrow + overlay)
     script = pp.ZeroOrMore((text | name) + "=" + sequence + ";") + sequence + pp.StringEnd()
@@ -251,7 +257,7 @@ def test_damaged_scripts_are_read_or_refused_in_one_line() -> None:
 
 def test_names_that_no_text_has_are_not_printed() -> None:
     tree = parse("a").sequence
-    broken = Term(ClipName('a"b', quoted=True))
+    broken = ScriptTerm(ClipName('a"b', quoted=True))
     overlay = type(tree.overlays[0])((broken,))
     with pytest.raises(ConfigError, match="clip: cannot be quoted"):
         text_of(Script((), type(tree)((overlay,))))
@@ -269,7 +275,7 @@ def test_scripts_in_files(tmp_path) -> None:
 
 def test_the_clips_of_a_script_are_known_by_name() -> None:
     script = parse('both = (kick | "a b" on arms) * 2; <up> -> both -> (walk[0:1] -> stand) @ 2')
-    assert clip_names(script) == {"kick", "a b", "both", "walk", "stand"}
+    assert clip_names(script) == {"kick", "a b", "both", "up", "walk", "stand"}
 
 
 def test_a_table_is_read_back_and_may_be_edited(tmp_path: Path) -> None:
@@ -277,11 +283,11 @@ def test_a_table_is_read_back_and_may_be_edited(tmp_path: Path) -> None:
     that is added happens at once, a column that is added comes next."""
     rng = np.random.default_rng(7)
     for _ in range(200):
-        script = plain(random_script(rng))
+        script = without_brackets(random_script(rng))
         assert parse(text_of_table(table_of(script))) == script
     file = tmp_path / "edited.csv"
     file.write_text(to_csv(parse("squat -> (punch | wave on left_arm)")))
-    assert read_table(file) == plain(parse("squat -> (punch | wave on left_arm)"))
+    assert read_table(file) == without_brackets(parse("squat -> (punch | wave on left_arm)"))
     file.write_text(",->,->{cross}\nbow,punch,stand\n,wave on left_arm,\n")
     assert find_script(str(file)) == parse("bow -> punch | wave on left_arm ->{cross} stand")
     for text, words in (

@@ -1,4 +1,4 @@
-"""envs/sensing/prediction.py: a state led on by promised accelerations."""
+"""envs/sensing/promises.py: a state led on by promised accelerations."""
 
 import mujoco
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.envs.sensing.estimator import EstimatedState
-from poise.envs.sensing.prediction import Promises, keep_promises, predict, turn_axes
+from poise.envs.sensing.promises import Promises, keep_promises, predict, turn_axes
 from tests.support.physics import random_state
 from tests.support.sensing import estimated, start
 from tests.support.shared import robot
@@ -34,7 +34,7 @@ def test_a_prediction_is_mujocos_integration():
     for now, row in enumerate(rows, 1):
         promises.last[:] = row
         keep_promises(promises, now)
-    assert np.array_equal(promises.rows[19 % 16], rows[19]) and promises.written[0] == 20
+    assert np.array_equal(promises.rows[19 % 16], rows[19]) and promises.written == 20
     for first, count in ((8, 12), (14, 14)):  # the latter longer than what is promised
         qpos, v = random_state(robot(), rng)
         position, q, velocity = qpos[:3].copy(), qpos[7:].copy(), v.copy()
@@ -54,7 +54,7 @@ def test_steps_before_the_first_promise_have_none():
     """A row counts once it is written; what was written is not changed by the next promise."""
     promises = Promises.allocate({"n": 8, "nv": robot().model.nv})
     keep_promises(promises, 0)
-    assert promises.written[0] == 0
+    assert promises.written == 0
     promises.last[:] = 1.0
     keep_promises(promises, 3)
     promises.last[:] = 2.0

@@ -1,0 +1,90 @@
+"""The command as a policy observes it: what it must be asked for so that the robot does as
+commanded."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.envs.compiled.jit import compiled
+
+MOST_KNOTS = 32  # of an axis, both signs together
+ROWS = ("ahead", "left", "turn", "in_place")
+TURN, IN_PLACE = 2, 3
+
+Knots = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A policy observes f(c) in the place of a command c, each axis by itself.
+
+    f is piecewise linear through knots (c, f(c)), and beyond the outer ones has a slope of 1. A
+    policy that walks at g(u) where it observes u follows the command with f = g⁻¹. Without knots
+    f(c) = c.
+
+    Attributes:
+        ahead: Knots of the speed ahead [m/s], in the order of c.
+        left: Knots of the speed to the left [m/s], of c ≥ 0 from (0, 0) on: f(−c) = −f(c).
+        turn: Knots of the turning rate [rad/s], likewise.
+        in_place: The same where no speed is commanded; without knots `turn` holds there too.
+    """
+
+    ahead: Knots = ()
+    left: Knots = ()
+    turn: Knots = ()
+    in_place: Knots = ()
+
+    def __post_init__(self) -> None:
+        for name in ROWS:
+            knots = getattr(self, name)
+            if not knots:
+                continue
+            commands, seen = (list(column) for column in zip(*knots, strict=True))
+            if commands != sorted(set(commands)) or seen != sorted(seen):
+                raise ValueError(f"{name}: knots must increase")
+            if (0.0, 0.0) not in [(c, u) for c, u in knots]:
+                raise ValueError(f"{name}: needs the knot [0, 0], at which it stands")
+            if name != "ahead" and commands[0] != 0.0:
+                raise ValueError(f"{name}: must begin with [0, 0]; both sides are alike")
+        if any(len(self._both(name)) > MOST_KNOTS for name in ROWS):
+            raise ValueError(f"at most {MOST_KNOTS} knots in an axis")
+
+    def _both(self, name: str) -> Knots:
+        """Return the knots of both signs."""
+        knots: Knots = getattr(self, name)
+        if name == "ahead":
+            return knots
+        return (*((-c, -u) for c, u in reversed(knots[1:])), *knots)
+
+    def table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the knots (4, 32, 2) of `ROWS`, and how many of each count (4,)."""
+        table, count = np.zeros((len(ROWS), MOST_KNOTS, 2)), np.zeros(len(ROWS))
+        for a, name in enumerate(ROWS):
+            knots = self._both(name)
+            count[a] = len(knots)
+            if knots:
+                table[a, : len(knots)] = knots
+        return table, count
+
+
+@compiled
+def through(knots: np.ndarray, n: int, command: float) -> float:
+    """f(command) of the first `n` of the knots (m, 2)."""
+    if n == 0:
+        return command
+    if command <= knots[0, 0]:
+        return knots[0, 1] + command - knots[0, 0]
+    for i in range(1, n):
+        if command <= knots[i, 0]:
+            fraction = (command - knots[i - 1, 0]) / (knots[i, 0] - knots[i - 1, 0])
+            return knots[i - 1, 1] + fraction * (knots[i, 1] - knots[i - 1, 1])
+    return knots[n - 1, 1] + command - knots[n - 1, 0]
+
+
+@compiled
+def calibrated(table: np.ndarray, count: np.ndarray, command: np.ndarray, axis: int) -> float:
+    """f of an axis of the command (≥ 3,); table and count are those of `Calibration.table`."""
+    row = axis
+    if axis == TURN and count[IN_PLACE] > 0.0 and command[0] == 0.0 and command[1] == 0.0:
+        row = IN_PLACE
+    return through(table[row], int(count[row]), command[axis])

@@ -1,0 +1,31 @@
+"""What an error is about, in place of how it says it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from poise.configs.problems import Problem
+
+
+@contextmanager
+def refused(
+    problem: str,
+    field: str | None = None,
+    *,
+    source: str | None = None,
+    choices: Iterable[str] | None = None,
+    **facts: Any,
+) -> Iterator[pytest.ExceptionInfo[Problem]]:
+    """A block that raises this problem of this field; source, choices and facts where given."""
+    with pytest.raises(Problem) as caught:
+        yield caught
+    found = caught.value
+    assert (found.problem, found.field) == (problem, field), found
+    assert source is None or found.source == source, found
+    assert choices is None or found.choices == tuple(choices), found
+    assert {name: found.facts.get(name) for name in facts} == facts, found
+    assert "\n" not in str(found)

@@ -1,0 +1,1 @@
+"""A controller on Unitree's messages LowState and LowCmd, and a simulated robot that takes them."""
