@@ -38,10 +38,10 @@ class Physics:
     """
 
     engine: Literal["mujoco", "drake"] = MUJOCO
-    substeps: int = field(default=1, metadata={"min": 1, "max": 100})
+    substeps: int = field(default=2, metadata={"min": 1, "max": 100})
     contact: Literal["lagged", "sap"] = "lagged"
     sink: float = field(default=4e-3, metadata={"above": 0.0, "max": 0.1})
-    dissipation: float = field(default=5.0, metadata={"min": 0.0, "max": 1e3})
+    dissipation: float = field(default=28.0, metadata={"min": 0.0, "max": 1e3})
     slip: float = field(default=1e-4, metadata={"above": 0.0, "max": 0.1})
     relaxation: float = field(default=0.01, metadata={"min": 0.0, "max": 1.0})
 
