@@ -17,7 +17,6 @@ from poise.training.benchmarking.evaluation.tables import (
 )
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
-    AIMED,
     CHATTER,
     ETA_MEAN,
     ETA_WORST,
@@ -34,7 +33,7 @@ from poise.training.running.columns import (
 from poise.training.running.files import SETTINGS, SUMMARY, TRIALS
 from poise.training.running.summary import Entry, Summary
 
-from .pages import Table, check_alike, direction_table, page_of
+from .pages import Table, check_alike, page_of
 from .read import load_results
 from .scenario_page import is_of_scenarios, scenario_page
 from .summary import read_summary
@@ -45,7 +44,6 @@ SCENARIO_PAGE = Path("docs/scenarios.md")
 COLUMNS = {"recovered, mix", *IN_PAIRS, *(each.heading for each in (
     J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, NOT_FALLEN, ROOT, TICK))}  # fmt: skip
 SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
-(ETA,) = (each for each in AIMED if each.key == "eta")
 
 
 def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = None) -> Path:
@@ -91,11 +89,6 @@ def leaderboard(summaries: Mapping[str, Summary]) -> str:
     """Return the page as Markdown; `summaries` by where they come from."""
     summary, origin = merged(summaries)
     (_, first), *later = summaries.items()
-    limit = dict(summary["robot"]["ankle_limit"])
-    angles = [d["direction"] for d in summary["controllers"][summary["reference"]]["directions"]]
-    directions = direction_table(summary["controllers"], summary["ranking"], ETA)
-    if all(angle in limit for angle in angles):
-        directions[1].insert(0, ["η = 1 at [N·s]", *(f"{limit[angle]:.1f}" for angle in angles)])
     return page_of(
         "leaderboard.md.j2",
         source=" ".join(summaries),
@@ -105,7 +98,6 @@ def leaderboard(summaries: Mapping[str, Summary]) -> str:
                for source, other in later],
         ranking=_ranking(summary),
         seeds=seed_lines(summary["seeds"]),
-        directions=directions,
         factors=_factors(summary),
     )  # fmt: skip
 

@@ -1,12 +1,11 @@
 """Helpers of the pages generated from committed files summary.json."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from poise.configs.errors import ConfigError
 from poise.configs.texts import code, markdown_page, markdown_table
 from poise.envs.physics.engines.config import MUJOCO
-from poise.training.running.columns import NONE, Figure
-from poise.training.running.summary import Entry, Summary
+from poise.training.running.summary import Summary
 
 Table = tuple[Sequence[str], list[list[str]]]  # headings and rows, as `markdown_table` takes them
 
@@ -32,19 +31,6 @@ def check_alike(
         for field, value in of(summary).items():
             if value != wanted[field]:
                 raise ConfigError(f"is not that of {first}", source=source, field=field)
-
-
-def direction_table(entries: Mapping[str, Entry], names: Iterable[str], figure: Figure) -> Table:
-    """Return a figure in every direction, of the controllers that were pushed."""
-    found = {name: {d["direction"]: d for d in entries[name].get("directions", ())}
-             for name in names}  # fmt: skip
-    angles = sorted({angle for each in found.values() for angle in each})
-    rows = [
-        [code(name), *(figure.text(own[a]) if a in own else NONE for a in angles)]
-        for name, own in found.items()
-        if own
-    ]
-    return ["controller", *(f"{angle:g}°" for angle in angles)], rows
 
 
 def _commit(summary: Summary) -> str:

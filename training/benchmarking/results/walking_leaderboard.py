@@ -6,7 +6,6 @@ from typing import Any
 
 from poise.configs.errors import ConfigError
 from poise.configs.texts import code, plain
-from poise.envs.physics.engines.config import MUJOCO
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text, shared_ranks
 from poise.training.benchmarking.statistics.rates import poisson_interval
@@ -14,7 +13,6 @@ from poise.training.running.columns import (
     COSTS,
     FALLS,
     FOLLOWED,
-    J50,
     J50_MEAN,
     J50_PER_MASS,
     NONE,
@@ -23,7 +21,7 @@ from poise.training.running.columns import (
 from poise.training.running.summary import Entry, Summary
 from poise.training.running.trial_figures import NOT_FALLEN, WalkLevel
 
-from .pages import Table, check_alike, direction_table, page_of
+from .pages import Table, check_alike, page_of
 
 OF_J50 = ("j50", "j90", "eta", "directions")  # how the keys of J50's figures begin
 UNPUSHED, PUSHED, KICKED = "walk", "walk_push", "walk_kick"
@@ -44,7 +42,7 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
     and for a controller without walks of the first one's commands.
     """
     check_alike(summaries, lambda of: {
-        "suite": of["suite"], "seed": of["seed"], "physics": of.get("physics", MUJOCO),
+        "suite": of["suite"], "seed": of["seed"],
         "robot.name": of["robot"]["name"], "robot.mass": of["robot"]["mass"],
     })  # fmt: skip
     first, *_ = summaries.values()
@@ -55,7 +53,6 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         "walks.md.j2",
         source=" ".join(summaries),
         first=first,
-        heading=J50.heading,
         levels={level: _of_level(results) for level, results in levels.items()},
     )
 
@@ -82,7 +79,6 @@ def _of_level(summaries: Mapping[str, Summary]) -> dict[str, Any]:
         "by_falls": len(older) < len(names),
         "ranking": _ranking(entries, names),
         "commands": {command: _walks(entries, names, command) for command in commands},
-        "directions": direction_table(entries, names, OF_DIRECTION),
         "results": [(summary, [name for name in summary["controllers"] if origin[name] == source])
                     for source, summary in summaries.items()],
     }  # fmt: skip
@@ -176,7 +172,6 @@ def _upright(level: WalkLevel | None) -> str:
 #: of a command; a page has room for two digits of steps
 WALKS = (FALLS[1], FOLLOWED[0], FOLLOWED[3], replace(STEPS[2], form=".2f"),
          replace(STEPS[4], form=".2f"), *COSTS[:3])  # fmt: skip
-OF_DIRECTION = replace(J50, bound="")
 
 
 def _walks(entries: Mapping[str, Entry], names: Sequence[str], command: str) -> Table:
