@@ -202,7 +202,7 @@ def guided(controller, state, targets, region, overreach, ground, stride, raised
     back."""
     c, h, offsets = controller.config, controller.robot.units.height, controller.offsets
     level, rate2 = controller.memory.level_frame, controller.robot.units.omega**2
-    R, xi, p = level[:2, :2], state.capture_point, controller.sets.parameters
+    R, xi, p = level[:2, :2], state.capture_point, controller.sets.posture
     r = controller.recentring
     rest = region.mean(axis=0)
     if controller.swing is None:
