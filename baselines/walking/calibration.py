@@ -25,7 +25,7 @@ class Calibration:
     Attributes:
         ahead: Knots of the speed ahead [m/s], in the order of c.
         left: Knots of the speed to the left [m/s], of c ≥ 0 from (0, 0) on: f(−c) = −f(c).
-        turn: Knots of the turning rate [rad/s], likewise.
+        turn: Knots of the turn rate [rad/s], of c ≥ 0 as well.
         in_place: The same where no speed is commanded; without knots `turn` holds there too.
     """
 

@@ -119,7 +119,7 @@ def call(typing: Any, address: Any, block: Any) -> Any:
 
 @intrinsic
 def call_named(typing: Any, function: Any, address: Any, block: Any) -> Any:
-    """`function(block)` by its address: as `call`, for a reader who wants to know what is called.
+    """`function(block)` by its address: as `call`, which names what is called.
 
     Nothing of `function` is compiled here; whoever made the block took the address of this one.
     """

@@ -90,7 +90,7 @@ def _stops() -> tuple[tuple[Any, str], ...]:
     """What long runs begin with."""
     return (
         (run, "Executor"), (search, "Executor"), (train_seeds, "Executor"),
-        (stable_baselines3.PPO, "learn"), (export, "recoveries"), (page, "film"),
+        (stable_baselines3.PPO, "learn"), (export, "recoveries"), (page, "film_again"),
         (video, "record"), (viewing, "_serve"),
     )  # fmt: skip
 

@@ -12,6 +12,9 @@ FILES = [path for room in ("envs", "baselines", "training") for path in (ROOT / 
 BY_REFERENCE = {"envs/physics/arms.py: seed", "envs/sensing/measurement.py: seed"}
 #: columns of one spline, whose parts are vectors; rows of a Jacobian
 SLICES = {
+    # rows of a table of knots, by axis; columns of footfalls, which are compared as arrays
+    "baselines/walking/calibration.py": {"TURN", "IN_PLACE"},
+    "baselines/balance/references/footfalls.py": {"TIME", "FOOT", "AHEAD", "COLUMNS"},
     "baselines/balance/references/footing.py": {"COM", "ROOT", "PLACE", "TURN", "SPIN", "COLUMNS"},
     "baselines/balance/stepping/planning/swing_speed.py": {"ROLL", "PITCH"},
     # apart, its noises are multiplied and added in another order: the last bit of an estimate moves

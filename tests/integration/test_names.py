@@ -25,6 +25,8 @@ KEPT = {
     "play": "`poise motion play`, and the part of a thread of `StepSchedule`",
     "contacts": "a term, and a part of what `prepare` compiles",
     "steps": "a term, and a part of what `prepare` compiles",
+    "command_turn": TERM,
+    "command_velocity": TERM,
     "push_force": TERM,
     "time_left": TERM,
     "turn_error": TERM,

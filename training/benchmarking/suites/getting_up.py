@@ -9,7 +9,7 @@ from .draw import MOST_TRIALS, Draw, SuitePart, start_seed
 
 
 @dataclass(frozen=True)
-class GetUp(SuitePart):
+class GetUpPart(SuitePart):
     """Postures on the ground (`fallen_posture`), one a trial; none is one of those of training."""
 
     trials: int = field(default=100, metadata={"min": 1, "max": MOST_TRIALS})

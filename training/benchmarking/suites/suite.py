@@ -14,7 +14,7 @@ from poise.configs.schema import build, read_yaml
 from .directions import Envelope, Grid, Margin
 from .draw import Standard, SuitePart
 from .factors import Factors, Mix
-from .getting_up import GetUp
+from .getting_up import GetUpPart
 from .lasting import Gusts, Sustained
 from .motions import MotionTrials
 from .random import PushSequence, Quiet, Random
@@ -58,7 +58,7 @@ class Suite(Standard):
     terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
     motions: MotionTrials | None = field(default=None, metadata={"omit": "default"})
     scenarios: Scenarios | None = field(default=None, metadata={"omit": "default"})
-    get_up: GetUp | None = field(default=None, metadata={"omit": "default"})
+    get_up: GetUpPart | None = field(default=None, metadata={"omit": "default"})
     levels: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
 
     def __post_init__(self) -> None:

@@ -85,9 +85,11 @@ def test_every_packaged_controller_takes_a_light_push(name):
     assert getattr(env.controller, "failures", 0) == 0
 
 
-@pytest.mark.parametrize("name", packaged("controllers"))
+@pytest.mark.parametrize("name", sorted(set(packaged("controllers")) - {"get-up"}))
 def test_every_packaged_controller_suits_another_robot(name):
-    """Gains are scaled by mass and height: `tall` stands for half a second."""
+    """Gains are scaled by mass and height: `tall` stands for half a second. The postures of
+    `get-up` name joints of the humanoid.
+    """
     env = ResidualBalanceEnv(robot("tall"), controller=name, pushes=None, duration=0.5)
     env.reset(seed=0)
     for _ in range(env.max_steps):

@@ -149,7 +149,7 @@ def test_start_and_goal_are_postures() -> None:
 
 def rests(made: Clip, record: dict[str, Any]) -> list[np.ndarray]:
     """Rotations of the frames in the middle of each posture that was wanted."""
-    held = [part for part in record["played"] if part["wanted"] and part["what"].startswith("<")]
+    held = [part for part in record["parts"] if part["wanted"] and part["what"].startswith("<")]
     middle = [round(0.5 * (part["begins"] + part["ends"]) / made.dt) for part in held]
     return [made.rotations[frame, 1:] for frame in middle]
 
