@@ -53,7 +53,10 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         "walks.md.j2",
         source=" ".join(summaries),
         first=first,
-        levels={level: _of_level(results) for level, results in levels.items()},
+        levels={
+            level: _of_level(levels[level])
+            for level in sorted(levels, key=lambda level: level != IDEAL)
+        },
     )
 
 
@@ -79,9 +82,20 @@ def _of_level(summaries: Mapping[str, Summary]) -> dict[str, Any]:
         "by_falls": len(older) < len(names),
         "ranking": _ranking(entries, names),
         "commands": {command: _walks(entries, names, command) for command in commands},
-        "results": [(summary, [name for name in summary["controllers"] if origin[name] == source])
-                    for source, summary in summaries.items()],
+        "results": _by_machine(summaries, origin),
     }  # fmt: skip
+
+
+def _by_machine(
+    summaries: Mapping[str, Summary], origin: Mapping[str, str]
+) -> list[tuple[Summary, list[str]]]:
+    """Return a result of each commit and machine, and the controllers that were evaluated there."""
+    found: dict[tuple[object, ...], tuple[Summary, list[str]]] = {}
+    for source, summary in summaries.items():
+        key = summary["commit"], summary["machine"]["processor"], summary["machine"]["cores"]
+        names = found.setdefault(key, (summary, []))[1]
+        names += [name for name in summary["controllers"] if origin[name] == source]
+    return list(found.values())
 
 
 def _pushed(entries: Mapping[str, Entry]) -> str:
