@@ -51,7 +51,7 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         levels.setdefault(summary.get("realism", IDEAL), {})[source] = summary
     return page_of(
         "walks.md.j2",
-        source=" ".join(summaries),
+        sources=list(summaries),
         first=first,
         levels={
             level: _of_level(levels[level])
