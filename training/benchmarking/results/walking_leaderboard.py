@@ -8,13 +8,11 @@ from poise.configs.errors import ConfigError
 from poise.configs.texts import code, plain
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text, shared_ranks
-from poise.training.benchmarking.statistics.rates import poisson_interval
 from poise.training.running.columns import (
     COSTS,
     FALLS,
     FOLLOWED,
     J50_MEAN,
-    J50_PER_MASS,
     NONE,
     STEPS,
 )
@@ -140,31 +138,27 @@ def _by_one_verdict(entries: Mapping[str, Entry]) -> dict[str, Entry]:
 def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
     kicks = list(dict.fromkeys(
         level["level"] for name in names for level in _levels(entries[name], KICKED)))  # fmt: skip
-    head = ["", "controller", J50_MEAN.heading, J50_PER_MASS.unit, "worst direction",
+    head = ["", "controller", J50_MEAN.heading, "worst direction",
             "not fallen, pushed", "as commanded again", *(f"kicked {kick}" for kick in kicks),
-            "fell unpushed", "falls a minute", "as commanded, unpushed"]  # fmt: skip
+            "fell unpushed", "as commanded, unpushed"]  # fmt: skip
     rank, rows = shared_ranks(entries, ("j50_mean", ".1f")), []
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
         fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)
-        followed, minutes = sum(w["recovered"] for w in walks), sum(w["minutes"] for w in walks)
-        low, high = poisson_interval(fallen)
-        rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
-                if minutes else NONE)  # fmt: skip
+        followed = sum(w["recovered"] for w in walks)
         kicked = {level["level"]: level for level in _levels(entry, KICKED)}
         rows.append([str(rank[name] or NONE), code(name), *_j50(entry), *_pushes(entry),
                      *(_upright(kicked.get(kick)) for kick in kicks),
-                     f"{fallen} of {trials}", rate, f"{followed} of {trials}"])  # fmt: skip
+                     f"{fallen} of {trials}", f"{followed} of {trials}"])  # fmt: skip
     return head, rows
 
 
-def _j50(entry: Entry) -> tuple[str, str, str]:
+def _j50(entry: Entry) -> tuple[str, str]:
     if "j50_mean" not in entry:
-        return NONE, NONE, NONE
+        return NONE, NONE
     worst = min(entry["directions"], key=lambda each: each["j50"])
     return (
         j50_mean_text(entry),
-        f"{entry['j50_mean_per_mass']:.2f}",
         f"{worst['j50']:.1f} ({worst['direction']:g}°)",
     )
 
