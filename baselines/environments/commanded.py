@@ -28,6 +28,34 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.start import RESET_OPTIONS
 
 
+class FollowingEnv(BalanceEnv):
+    """Base of environments whose robot is to follow a velocity: their success and their info."""
+
+    def _commanded(self) -> np.ndarray:
+        """Return the command (3,): ahead, left [m/s], turn [rad/s]."""
+        raise NotImplementedError
+
+    def _velocity_error(self) -> np.ndarray:
+        """Return the velocity minus the command (3,)."""
+        raise NotImplementedError
+
+    @property
+    def recovered(self) -> bool:
+        """Not fallen, as the benchmark judges a walk; at rest, where nothing is commanded.
+
+        A tracking error is charged by the reward, and is "velocity_error" of `info`.
+        """
+        return not self.fallen if self._commanded().any() else super().recovered
+
+    def info(self) -> dict[str, Any]:
+        """The entries of the environment without a command, the command and the error from it."""
+        return {
+            **super().info(),
+            "command": self._commanded().copy(),
+            "velocity_error": self._velocity_error().copy(),
+        }
+
+
 class CommandedEnv(BalanceEnv):
     """Base of environments around a controller, which may be one that follows commands."""
 

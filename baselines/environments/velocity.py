@@ -29,7 +29,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
-from .commanded import CommandedEnv
+from .commanded import CommandedEnv, FollowingEnv
 from .velocity_terms import MEAN_TIME, VELOCITY_TERMS, CommandView, Course, follow_course
 
 
@@ -48,7 +48,7 @@ def velocity_step(step: VelocityStep):
     end_step(step.end)
 
 
-class VelocityEnv(CommandedEnv, PositionBalanceEnv):
+class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
     """Walk or stand as commanded, pushed or not, by targets of the joints' positions.
 
     Action: Box(−1, 1, (nu,)), that of `PositionBalanceEnv`: a target for each motor's servo, zero
@@ -143,22 +143,6 @@ class VelocityEnv(CommandedEnv, PositionBalanceEnv):
 
     def _report(self) -> Program:
         return Program.of([(follow_timetable, self._follower(self._known_orders))])
-
-    @property
-    def recovered(self) -> bool:
-        """Not fallen, as the benchmark judges a walk; at rest, where nothing is commanded.
-
-        A tracking error is charged by the reward, and is "velocity_error" of `info`.
-        """
-        return not self.fallen if self._commanded().any() else super().recovered
-
-    def info(self) -> dict[str, Any]:
-        """The entries of `PositionBalanceEnv`, the command and how far the walk is from it."""
-        return {
-            **super().info(),
-            "command": self._commanded().copy(),
-            "velocity_error": self._error.copy(),
-        }
 
 
 vector_env = partial(make_vector_env, VelocityEnv)  # for gymnasium.make_vec

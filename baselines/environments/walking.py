@@ -18,12 +18,12 @@ from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.robots.robot import Robot
 
-from .commanded import check_reach
+from .commanded import FollowingEnv, check_reach
 from .stepping import ResidualStepEnv
 from .walk_terms import WALK_TERMS, Strides, WalkReport, WalkReporter, WalkView, report_walk
 
 
-class ResidualWalkEnv(ResidualStepEnv):
+class ResidualWalkEnv(FollowingEnv, ResidualStepEnv):
     """Walk as commanded, pushed or not, by moving the targets and the steps of a planner.
 
     `ResidualStepEnv` around a controller that walks. Zero is the controller alone, bit for bit.
@@ -128,22 +128,6 @@ class ResidualWalkEnv(ResidualStepEnv):
         self._step_report.fill(self.stepper.stepping())
         report_walk(self._reporter())
         super()._observe()
-
-    @property
-    def recovered(self) -> bool:
-        """Not fallen, as the benchmark judges a walk; at rest, where nothing is commanded.
-
-        A tracking error is charged by the reward, and is "velocity_error" of `info`.
-        """
-        return not self.fallen if self._commanded().any() else super().recovered
-
-    def info(self) -> dict[str, Any]:
-        """The entries of `ResidualStepEnv`, the command and how far the walk is from it."""
-        return {
-            **super().info(),
-            "command": self.walker.gait.command[:3].copy(),
-            "velocity_error": self._strides.error.copy(),
-        }
 
 
 vector_env = partial(make_vector_env, ResidualWalkEnv)  # for gymnasium.make_vec

@@ -6,10 +6,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.jit import compiled
 from poise.envs.robots.robot import Robot
 
-from .task import Rows, Task, TaskInput, TaskSpace, TaskTick
+from .task import Rows, Task, TaskInput, TaskSpace, fill_small
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,19 +18,12 @@ class RootWrenchBlock(Block):
     weight: np.ndarray  # (6,) ω_root per N² and per (N·m)²
 
 
-@compiled
-def fill_root_wrench(t: TaskTick[RootWrenchBlock]):
-    """The rows of a small wrench on the root, see `RootWrench`."""
-    for a in range(t.rows.b.shape[0]):
-        t.rows.b[a], t.rows.weights[a] = 0.0, t.task.weight[a]
-
-
 @dataclass(frozen=True)
 class RootWrench(Task[RootWrenchBlock]):
     """ω_root ‖u_root‖²: what a soft root must not lean on. With a hard root it has no rows."""
 
     space: ClassVar[TaskSpace] = TaskSpace.ROOT
-    kernel = staticmethod(fill_root_wrench)
+    kernel = staticmethod(fill_small)
 
     kind: Literal["root-wrench"] = "root-wrench"
     weight: float = field(default=1e3, metadata={"above": 0.0})  #: per (m g)² and (m g h)²

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, Generic, NamedTuple
+from typing import Any, ClassVar, Generic, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from poise.baselines.controller import TargetArrays, Targets
 from poise.baselines.whole_body.parts.part import B, Bound, Part
 from poise.baselines.whole_body.parts.reduced_motion import ReducedMotion
 from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -72,6 +73,13 @@ class TaskTick(Block, Generic[B]):
     motion: ReducedMotion
     task: B  # the task's own block, made by `bind`
     rows: RowArrays
+
+
+@compiled
+def fill_small(t: TaskTick[Any]):
+    """Rows that keep a quantity small: no reference, and the weights of the block."""
+    for a in range(t.rows.b.shape[0]):
+        t.rows.b[a], t.rows.weights[a] = 0.0, t.task.weight[a]
 
 
 @dataclass(frozen=True)

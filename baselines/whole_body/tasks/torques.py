@@ -6,10 +6,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.jit import compiled
 from poise.envs.robots.robot import Robot
 
-from .task import Rows, Task, TaskInput, TaskSpace, TaskTick
+from .task import Rows, Task, TaskInput, TaskSpace, fill_small
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,19 +18,12 @@ class TorquesBlock(Block):
     weight: np.ndarray  # (nv−6,) per (N·m)²
 
 
-@compiled
-def fill_torques(t: TaskTick[TorquesBlock]):
-    """The rows of small torques, see `Torques`."""
-    for a in range(t.rows.b.shape[0]):
-        t.rows.b[a], t.rows.weights[a] = 0.0, t.task.weight[a]
-
-
 @dataclass(frozen=True)
 class Torques(Task[TorquesBlock]):
     """‖τ‖² of all joints."""
 
     space: ClassVar[TaskSpace] = TaskSpace.TORQUES
-    kernel = staticmethod(fill_torques)
+    kernel = staticmethod(fill_small)
 
     kind: Literal["torques"] = "torques"
     weight: float = field(default=0.0, metadata={"min": 0.0})  #: per (m g h)²

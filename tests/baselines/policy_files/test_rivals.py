@@ -390,6 +390,16 @@ def holosoma_dance() -> Loop:
     return plain._replace(observe=observe, scale=1.0, bound=100.0)
 
 
+def remembered(plain: Loop, past: deque, reference: np.ndarray, n: Now) -> np.ndarray:
+    """What TWIST2's network sees: this step, the ten before it, and the reference again."""
+    v = n.v.copy()
+    v[[4, 5, 10, 11]] = 0.0
+    now = frame(reference, 0.25 * n.gyro, n.roll_pitch, n.q - plain.default, 0.05 * v, n.action)
+    seen = frame(now, *past, reference)
+    past.append(now)
+    return seen
+
+
 def twist2_tracker() -> Loop:
     """Its default posture at rest, on soles as high as standing."""
     plain = twist2()
@@ -406,15 +416,7 @@ def twist2_tracker() -> Loop:
     reference = frame([0, 0], height, [0, 0], 0, plain.default)
     past = deque([np.zeros(127)] * 10, maxlen=10)
 
-    def observe(n: Now) -> np.ndarray:
-        v = n.v.copy()
-        v[[4, 5, 10, 11]] = 0.0
-        now = frame(reference, 0.25 * n.gyro, n.roll_pitch, n.q - plain.default, 0.05 * v, n.action)
-        seen = frame(now, *past, reference)
-        past.append(now)
-        return seen
-
-    return plain._replace(observe=observe)
+    return plain._replace(observe=lambda n: remembered(plain, past, reference, n))
 
 
 LOOPS: dict[str, Callable[[], Loop]] = {
@@ -498,6 +500,18 @@ def standing_gains(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return 15.0**2 * inertia, 30.0 * inertia, robot.standing_qpos[7:].copy()
 
 
+def first_actions(env: ResidualBalanceEnv, loop: Loop, path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(T, na) the first actions in the environment and in the maker's loop, from a shaky start."""
+    env.reset(seed=1, options=SHAKY)
+    data, rest = mujoco.MjData(env.robot.model), np.zeros(len(env.action_names))
+    data.qpos[:], data.qvel[:] = env.simulation.data.qpos, env.simulation.data.qvel
+    here = []
+    for _ in range(STEPS):
+        env.step_without_info(rest)
+        here.append(env.controller.action.copy())
+    return np.array(here), np.array(list(played_apart(loop, path, env.robot, data)))
+
+
 @pytest.mark.parametrize("name", LOOPS)
 def test_it_acts_as_in_its_makers_loop(name: str) -> None:
     """Its first 200 actions, from a shaky start."""
@@ -506,14 +520,7 @@ def test_it_acts_as_in_its_makers_loop(name: str) -> None:
     robot = shared_robot(KNOWN[name].origin.robot)
     with allowed(path):
         env = ResidualBalanceEnv(robot, controller=name, pushes=None, duration=60.0)
-    env.reset(seed=1, options=SHAKY)
-    data, rest = mujoco.MjData(robot.model), np.zeros(len(env.action_names))
-    data.qpos[:], data.qvel[:] = env.simulation.data.qpos, env.simulation.data.qvel
-    here = []
-    for _ in range(STEPS):
-        env.step_without_info(rest)
-        here.append(env.controller.action.copy())
-    apart = np.array(list(played_apart(LOOPS[name](), path, robot, data)))
+    here, apart = first_actions(env, LOOPS[name](), path)
     size = np.maximum(1.0, np.abs(apart))
     apart_by = np.max(np.abs(here - apart) / size, axis=1)
     assert apart_by[:50].max() < 1e-5 and apart_by.max() < 1e-4 and not env.fallen

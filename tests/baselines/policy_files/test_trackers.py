@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -19,7 +18,7 @@ from tests.support.policies import onnx_session, write_yaml
 from tests.support.rivals import network
 from tests.support.shared import robot as shared_robot
 
-from .test_rivals import SHAKY, STEPS, Loop, Now, frame, played_apart
+from .test_rivals import STEPS, Loop, Now, first_actions, frame, remembered
 
 RATE = 50.0
 
@@ -114,12 +113,7 @@ def twist2(plain: Loop, clip: Clip) -> Loop:
         _, pitch, roll = clip.turn[i].as_euler("ZYX")
         local = clip.turn[i].inv().apply(speed[i])
         reference = frame(local[:2], clip.root[i, 2], roll, pitch, rate[2], clip.q[i])
-        v = n.v.copy()
-        v[[4, 5, 10, 11]] = 0.0
-        now = frame(reference, 0.25 * n.gyro, n.roll_pitch, n.q - plain.default, 0.05 * v, n.action)
-        seen = frame(now, *past, reference)
-        past.append(now)
-        return seen
+        return remembered(plain, past, reference, n)
 
     return plain._replace(observe=observe)
 
@@ -169,14 +163,7 @@ def test_the_clip_within_a_network_is_followed_as_in_its_makers_loop(tmp_path: P
 def compared(robot: Robot, controller: str, loop: Loop, path: Path) -> None:
     """Poise's actions are those of the loop."""
     env = ResidualBalanceEnv(robot, controller=controller, pushes=None, duration=60.0)
-    env.reset(seed=1, options=SHAKY)
-    data, rest = mujoco.MjData(robot.model), np.zeros(len(env.action_names))
-    data.qpos[:], data.qvel[:] = env.simulation.data.qpos, env.simulation.data.qvel
-    here = []
-    for _ in range(STEPS):
-        env.step_without_info(rest)
-        here.append(env.controller.action.copy())
-    apart = np.array(list(played_apart(loop, path, robot, data)))
+    here, apart = first_actions(env, loop, path)
     apart_by = np.max(np.abs(here - apart) / np.maximum(1.0, np.abs(apart)), axis=1)
     # observations are rounded to 32 bits; contact makes that grow while the robot moves
     assert apart_by[:50].max() < 1e-5 and apart_by.max() < 1e-3 and not env.fallen

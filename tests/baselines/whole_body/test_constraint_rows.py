@@ -16,21 +16,9 @@ from tests.support.physics import (
     controller,
     forward,
     random_state,
-    recovery,
     robot_named,
     wrench_about,
 )
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_named("humanoid")
-
-
-@pytest.fixture(scope="module")
-def tick():
-    """A state on the way back from a push, where limits bind."""
-    return recovery()[30]
 
 
 @pytest.mark.parametrize("name", ["humanoid", "compact", "tall"])

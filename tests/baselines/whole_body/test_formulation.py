@@ -22,17 +22,6 @@ from poise.baselines.whole_body.tasks.task import Rows
 from tests.support.physics import recovery, robot_named
 
 
-@pytest.fixture(scope="module")
-def robot():
-    return robot_named("humanoid")
-
-
-@pytest.fixture(scope="module")
-def tick():
-    """A state on the way back from a push, where limits bind."""
-    return recovery()[30]
-
-
 def solve(qp, name="daqp"):
     solution = make_solver(name).solve(qp)
     assert solution.solved

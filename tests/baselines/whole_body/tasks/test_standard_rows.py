@@ -12,18 +12,7 @@ from poise.baselines.whole_body.tasks.cop import CoP, desired_cop, desired_momen
 from poise.baselines.whole_body.tasks.posture import Posture, carrying_velocity
 from poise.baselines.whole_body.tasks.task import Bound, all_rows, task_input
 from poise.envs.physics.simulation import Simulation
-from tests.support.physics import controller, recovery, robot_named, wrench_about
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_named("humanoid")
-
-
-@pytest.fixture(scope="module")
-def tick():
-    """A state on the way back from a push, where limits bind."""
-    return recovery()[30]
+from tests.support.physics import controller, robot_named, wrench_about
 
 
 def bound(task, **numbers):
