@@ -84,6 +84,23 @@ def test_desired_momentum_rates(tick):
         np.testing.assert_allclose(found, moment, atol=1e-9)
 
 
+def test_momentum_rows_are_met_by_the_motion_they_ask_for(tick):
+    """Where v̇ gives Ṗ_des and L̇_des, the rows have no residual."""
+    state, targets = tick.state, tick.targets
+    com, cop = bound(CoM()), bound(CoP())
+    given = task_input(state, targets, cop_vel=tick.cop_vel)
+    linear, angular = all_rows([com, cop], given)
+    A, b = np.vstack([linear.A, angular.A]), np.concatenate([linear.b, angular.b])
+    rate = state.A @ np.linalg.lstsq(A, b, rcond=None)[0] + state.Adot_v
+    gains = com.block
+    accel = targets.com_acc + gains.stiffness * (targets.com - state.com)
+    accel += gains.damping * (targets.com_vel - state.com_vel)
+    np.testing.assert_allclose(rate[:3], state.mass * accel, atol=1e-8)
+    force = rate[:3] + [0.0, 0.0, state.mass * 9.81]
+    expected = desired_moment(given._replace(force=force), cop.block)
+    np.testing.assert_allclose(rate[3:], expected, atol=1e-8)
+
+
 def test_carried_momentum(tick):
     """v* has the angular momentum asked for and moves neither the soles nor the CoM."""
     state, L_ref = tick.state, np.array([3.0, -2.0, 0.0])
