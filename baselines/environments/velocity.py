@@ -96,7 +96,8 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
     ):
         self.command_sampler = CommandSampler() if command is None else command_sampler(command)
         self.calibration = calibration or Calibration()
-        self._calibrated = self.calibration.table()
+        start = np.array(self.calibration.start)
+        self._calibrated = *self.calibration.table(), start, self.calibration.still
         self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
         self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
         super().__init__(robot, config, **arguments)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.baselines.walking.calibration import calibrated
+from poise.baselines.walking.calibration import begun, calibrated
 from poise.envs.balance.mdp.observation import GROUND, Terms, View
 from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.compiled.block import Block
@@ -23,8 +23,20 @@ class CommandView(Block):
     seen: View
     command: np.ndarray  # (8,) see `GaitCommand.array`
     error: np.ndarray  # (3,) see `Course`
-    knots: np.ndarray  # (4, 32, 2) and
-    count: np.ndarray  # (4,) of `Calibration.table`
+    knots: np.ndarray  # (5, 32, 2) and
+    count: np.ndarray  # (5,) of `Calibration.table`
+    start: np.ndarray  # (3,) and
+    still: float  # of the same `Calibration`
+
+
+@compiled
+def observed(t: CommandView, axis: int) -> float:
+    """An axis of the command as it is observed, see `Calibration`."""
+    seen = calibrated(t.knots, t.count, t.command, axis)
+    rates = t.seen.state.qvel[6:]
+    if np.sqrt(np.mean(rates * rates)) < t.still:
+        seen = begun(seen, t.command, axis, t.start[axis])
+    return seen
 
 
 VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environment first
@@ -34,13 +46,13 @@ VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environme
 def command_velocity(t: CommandView):
     seen = t.seen
     for a in range(2):
-        seen.out[a] = calibrated(t.knots, t.count, t.command, a) / seen.scales.velocity
+        seen.out[a] = observed(t, a) / seen.scales.velocity
 
 
 @VELOCITY_TERMS.add(("z",), "0.2 ω", "commanded turning rate, to the left", "turn")
 def command_turn(t: CommandView):
     seen = t.seen
-    seen.out[0] = calibrated(t.knots, t.count, t.command, 2) / (0.2 * seen.scales.omega)
+    seen.out[0] = observed(t, 2) / (0.2 * seen.scales.omega)
 
 
 @VELOCITY_TERMS.add(

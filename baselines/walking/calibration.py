@@ -1,15 +1,15 @@
 """The command as a policy observes it: what it must be asked for so that the robot does as
 commanded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from poise.envs.compiled.jit import compiled
 
 MOST_KNOTS = 32  # of an axis, both signs together
-ROWS = ("ahead", "left", "turn", "in_place")
-TURN, IN_PLACE = 2, 3
+ROWS = ("ahead", "left", "turn", "in_place", "aside")
+AHEAD, LEFT, TURN, IN_PLACE, ASIDE = range(5)
 
 Knots = tuple[tuple[float, float], ...]
 
@@ -20,19 +20,29 @@ class Calibration:
 
     f is piecewise linear through knots (c, f(c)), and beyond the outer ones has a slope of 1. A
     policy that walks at g(u) where it observes u follows the command with f = g⁻¹. Without knots
-    f(c) = c.
+    f(c) = c. A policy that stands at low commands, and walks on at them once it walks, has to begin:
+    where it stands still though it is commanded to walk, the axis that leads is observed as
+    sign(c) max(|f(c)|, s). The speed ahead leads, without one that to the left, without both the
+    turn.
 
     Attributes:
         ahead: Knots of the speed ahead [m/s], in the order of c.
         left: Knots of the speed to the left [m/s], of c ≥ 0 from (0, 0) on: f(−c) = −f(c).
         turn: Knots of the turn rate [rad/s], of c ≥ 0 as well.
         in_place: The same where no speed is commanded; without knots `turn` holds there too.
+        aside: Knots of the speed to the left where none ahead is commanded; without knots `left`.
+        still: Root mean square of the joint velocities [rad/s] below which the robot stands still;
+            0: never.
+        start: s of ahead, left [m/s] and turn [rad/s].
     """
 
     ahead: Knots = ()
     left: Knots = ()
     turn: Knots = ()
     in_place: Knots = ()
+    aside: Knots = ()
+    still: float = field(default=0.0, metadata={"min": 0.0})
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ROWS:
@@ -57,7 +67,7 @@ class Calibration:
         return (*((-c, -u) for c, u in reversed(knots[1:])), *knots)
 
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the knots (4, 32, 2) of `ROWS`, and how many of each count (4,)."""
+        """Return the knots (5, 32, 2) of `ROWS`, and how many of each count (5,)."""
         table, count = np.zeros((len(ROWS), MOST_KNOTS, 2)), np.zeros(len(ROWS))
         for a, name in enumerate(ROWS):
             knots = self._both(name)
@@ -85,6 +95,20 @@ def through(knots: np.ndarray, n: int, command: float) -> float:
 def calibrated(table: np.ndarray, count: np.ndarray, command: np.ndarray, axis: int) -> float:
     """f of an axis of the command (≥ 3,); table and count are those of `Calibration.table`."""
     row = axis
-    if axis == TURN and count[IN_PLACE] > 0.0 and command[0] == 0.0 and command[1] == 0.0:
+    if axis == TURN and count[IN_PLACE] > 0.0 and command[AHEAD] == 0.0 and command[LEFT] == 0.0:
         row = IN_PLACE
+    elif axis == LEFT and count[ASIDE] > 0.0 and command[AHEAD] == 0.0:
+        row = ASIDE
     return through(table[row], int(count[row]), command[axis])
+
+
+@compiled
+def begun(seen: float, command: np.ndarray, axis: int, start: float) -> float:
+    """What is observed of an axis where the robot stands still: at least `start` if it leads and
+    does not observe 0, which is to stand."""
+    lead = AHEAD
+    while lead < TURN and command[lead] == 0.0:
+        lead += 1
+    if axis != lead or seen == 0.0:
+        return seen
+    return max(abs(seen), start) * np.sign(command[lead])
