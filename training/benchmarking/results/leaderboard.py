@@ -47,16 +47,14 @@ SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may sta
 
 
 def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = None) -> Path:
-    """Write the page from files summary.json that have J50s, or folders that hold one; returns it.
+    """Write the page from files summary.json that have J50s, or folders of them; returns it.
 
     Results of a suite that walks make the page of walks, those of scenarios theirs, and results of
     two kinds none. Without a `page` it is the kind's own. Raises ConfigError for another file, or
     of another suite, seed, robot or reference than the first; PoiseError when the page cannot be
     written.
     """
-    summaries = {}
-    for source in sources:
-        summaries[str(source)] = _summary(Path(source))
+    summaries = {str(path): _summary(path) for source in sources for path in _results(Path(source))}
     kinds = {source: (is_of_walks(summary), is_of_scenarios(summary))
              for source, summary in summaries.items()}  # fmt: skip
     walks, scenarios = next(iter(kinds.values()))
@@ -70,11 +68,18 @@ def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = N
         write_atomic(page, scenario_page(summaries, str(page)))
     elif walks:
         page = Path(page or WALKING_PAGE)
-        write_atomic(page, walking_leaderboard(summaries))
+        write_atomic(page, walking_leaderboard(summaries, [str(source) for source in sources]))
     else:
         page = Path(page or PAGE)
         write_atomic(page, leaderboard(summaries))
     return page
+
+
+def _results(source: Path) -> list[Path]:
+    """Of a folder that is no result itself the .json files in it, by name."""
+    if not is_folder(source) or is_file(source / SUMMARY):
+        return [source]
+    return sorted(source.glob("*.json")) or [source]
 
 
 def _summary(path: Path) -> Summary:

@@ -30,9 +30,11 @@ def is_of_walks(summary: Summary) -> bool:
     return any(_levels(entry, UNPUSHED) for entry in summary["controllers"].values())
 
 
-def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
+def walking_leaderboard(
+    summaries: Mapping[str, Summary], sources: Sequence[str] | None = None
+) -> str:
     """Return the page as Markdown; `summaries` by where they come from, of one suite, seed and
-    robot.
+    robot. `sources` are what the page names as its own: files, or folders of them.
 
     Each realism level has tables of its own. A controller of a later result takes the place of an
     earlier one of its name and level. The order is that of the mean J50 [N·s], those without one
@@ -49,7 +51,7 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         levels.setdefault(summary.get("realism", IDEAL), {})[source] = summary
     return page_of(
         "walks.md.j2",
-        sources=list(summaries),
+        sources=sources or list(summaries),
         first=first,
         levels={
             level: _of_level(levels[level])

@@ -34,11 +34,26 @@ def rows(text: str) -> list[list[str]]:
 
 
 @pytest.mark.parametrize("page", sorted(ROOT.glob("docs/walking-leaderboard*.md")))
-def test_the_committed_page_is_generated(page: Path) -> None:
+def test_the_committed_page_is_generated(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A page is what the command that it names makes of the results that it names."""
-    text = page.read_text()
-    (command,) = re.findall("`poise leaderboard ([^`]+)`", text)
-    assert walking_leaderboard({n: read_summary(ROOT / n) for n in command.split()}) == text
+    monkeypatch.chdir(ROOT)
+    (command,) = re.findall("`poise leaderboard ([^`]+)`", page.read_text())
+    assert write_leaderboard(command.split(), tmp_path / "page.md").read_text() == page.read_text()
+
+
+def test_a_folder_of_results_is_all_of_them(tmp_path: Path) -> None:
+    """The same tables as by naming each; an empty folder is refused by its name."""
+    folder = tmp_path / "walkers"
+    folder.mkdir()
+    with pytest.raises(ConfigError, match="walkers"):
+        write_leaderboard([folder])
+    for k, result in enumerate((ONE, OTHER)):
+        (folder / f"{k}.json").write_bytes(result.read_bytes())
+    whole, named = (write_leaderboard(of, tmp_path / f"{len(of)}.md").read_text()
+                    for of in ([folder], [ONE, OTHER]))  # fmt: skip
+    assert rows(whole) == rows(named) and f"`poise leaderboard {folder}`" in whole
 
 
 def test_walks_are_ranked_by_j50_whatever_the_order_of_results(tmp_path: Path) -> None:
