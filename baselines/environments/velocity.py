@@ -10,6 +10,7 @@ import numpy as np
 
 from poise.baselines.controller import COMMAND_ENTRIES
 from poise.baselines.walking.calibration import Calibration
+from poise.baselines.walking.correction import MEAN_TIME, Correction, correct_course
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import (
     CommandSampler,
@@ -30,7 +31,7 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .commanded import CommandedEnv, FollowingEnv
-from .velocity_terms import MEAN_TIME, VELOCITY_TERMS, CommandView, Course, follow_course
+from .velocity_terms import VELOCITY_TERMS, CommandView, Course, follow_course
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,7 @@ class VelocityStep(PositionStep):
     """All that a policy step works on."""
 
     course: Course
+    correction: Correction
 
 
 @compiled
@@ -45,6 +47,7 @@ def velocity_step(step: VelocityStep):
     """The policy step of `position_step`, judged by the command too."""
     drive_step(step)
     follow_course(step.course)
+    correct_course(step.correction)
     end_step(step.end)
 
 
@@ -100,6 +103,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self._calibrated = *self.calibration.table(), start, self.calibration.still
         self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
         self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
+        self._odometry, self._shift = guarded_zeros(3), guarded_zeros(3)
         super().__init__(robot, config, **arguments)
 
     def arguments(self) -> dict[str, Any]:
@@ -114,6 +118,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
     def _begin(self, options: Mapping[str, Any]) -> None:
         super()._begin(options)
         self._known_orders[:], self._mean[:] = 0.0, 0.0
+        self._odometry[:], self._shift[:] = 0.0, 0.0
         self._begin_walk(options)
         self._error[:] = -self._known_orders[:3]
 
@@ -128,19 +133,28 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         return self._known_orders[:3]
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
-        read = self._known_orders, self._error, *self._calibrated
+        read = self._known_orders, self._error, *self._calibrated, self._shift
         return read if kind is CommandView else super()._readings(kind)
 
     def _step_members(self) -> dict[str, Any]:
         period = self.config.policy_period
+        part = float(-np.expm1(-period / MEAN_TIME))
         course = Course(
             state=self.simulation.state_arrays,
             command=self._known_orders,
             mean=self._mean,
             error=self._error,
-            part=float(-np.expm1(-period / MEAN_TIME)),
+            part=part,
         )
-        return {**super()._step_members(), "course": course}
+        correction = Correction(
+            state=self.state_source.state_arrays,
+            command=self._known_orders,
+            mean=self._odometry,
+            shift=self._shift,
+            part=part,
+            rate=self.calibration.correction * period,
+        )
+        return {**super()._step_members(), "course": course, "correction": correction}
 
     def _report(self) -> Program:
         return Program.of([(follow_timetable, self._follower(self._known_orders))])

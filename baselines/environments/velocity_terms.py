@@ -6,14 +6,13 @@ from typing import Annotated
 import numpy as np
 
 from poise.baselines.walking.calibration import begun, calibrated
+from poise.baselines.walking.correction import turn_rate
 from poise.envs.balance.mdp.observation import GROUND, Terms, View
 from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along
 from poise.envs.physics.kinematics import StateArrays
-
-MEAN_TIME = 0.5  # [s] of the low-pass: the sway of a stride is averaged out, a stop is not
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +26,13 @@ class CommandView(Block):
     count: np.ndarray  # (5,) of `Calibration.table`
     start: np.ndarray  # (3,) and
     still: float  # of the same `Calibration`
+    shift: np.ndarray  # (3,) of a `Correction`
 
 
 @compiled
 def observed(t: CommandView, axis: int) -> float:
     """An axis of the command as it is observed, see `Calibration`."""
-    seen = calibrated(t.knots, t.count, t.command, axis)
+    seen = calibrated(t.knots, t.count, t.command, axis, t.shift[axis])
     rates = t.seen.state.qvel[6:]
     if np.sqrt(np.mean(rates * rates)) < t.still:
         seen = begun(seen, t.command, axis, t.start[axis])
@@ -90,11 +90,8 @@ def follow_course(c: Course):
     """Take in a policy step: mean ← mean + part (v − mean), in the heading frame."""
     s, part = c.state, c.part
     ahead, left = along(s.heading[0], s.heading[1], s.com_vel[0], s.com_vel[1])
-    turn = 0.0
-    for a in range(3):
-        turn += s.root_axes[2, a] * s.qvel[3 + a]
     c.mean[0] += part * (ahead - c.mean[0])
     c.mean[1] += part * (left - c.mean[1])
-    c.mean[2] += part * (turn - c.mean[2])
+    c.mean[2] += part * (turn_rate(s) - c.mean[2])
     for a in range(3):
         c.error[a] = c.mean[a] - c.command[a]

@@ -34,6 +34,7 @@ class Calibration:
         still: Root mean square of the joint velocities [rad/s] below which the robot stands still;
             0: never.
         start: s of ahead, left [m/s] and turn [rad/s].
+        correction: k [1/s] of the integral of the velocity's error, see `correction.py`; 0: none.
     """
 
     ahead: Knots = ()
@@ -43,6 +44,7 @@ class Calibration:
     aside: Knots = ()
     still: float = field(default=0.0, metadata={"min": 0.0})
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    correction: float = field(default=0.0, metadata={"min": 0.0, "max": 5.0})
 
     def __post_init__(self) -> None:
         for name in ROWS:
@@ -92,14 +94,16 @@ def through(knots: np.ndarray, n: int, command: float) -> float:
 
 
 @compiled
-def calibrated(table: np.ndarray, count: np.ndarray, command: np.ndarray, axis: int) -> float:
-    """f of an axis of the command (≥ 3,); table and count are those of `Calibration.table`."""
+def calibrated(
+    table: np.ndarray, count: np.ndarray, command: np.ndarray, axis: int, shift: float = 0.0
+) -> float:
+    """f(c + shift) of an axis of the command (≥ 3,); table and count as of `Calibration.table`."""
     row = axis
     if axis == TURN and count[IN_PLACE] > 0.0 and command[AHEAD] == 0.0 and command[LEFT] == 0.0:
         row = IN_PLACE
     elif axis == LEFT and count[ASIDE] > 0.0 and command[AHEAD] == 0.0:
         row = ASIDE
-    return through(table[row], int(count[row]), command[axis])
+    return through(table[row], int(count[row]), command[axis] + shift)
 
 
 @compiled
