@@ -125,7 +125,8 @@ def test_a_fingerprint_tells_how_a_policy_plays(robot: Robot, tmp_path: Path) ->
 
 @pytest.mark.parametrize("name", policies_here())
 def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
-    """residual on the baseline, residual-CONTROLLER on another; no larger than need be."""
+    """residual on the baseline, which may lean, residual-CONTROLLER on another; no larger than need
+    be."""
     found = load_policy(name).config
     if found.action != "residual":
         steps = "residual-torque" if found.step_residual.torque > 0.0 else "residual-step"
@@ -135,7 +136,7 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
         level = "" if found.env.realism.ideal else f"-{found.env.realism.name}"
         assert name == f"{others[found.action]}{level}"
     else:
-        on_baseline = found.controller == "momentum-qp"
+        on_baseline = found.controller in ("momentum-qp", "momentum-qp-compensated")
         assert name == ("residual" if on_baseline else f"residual-{found.controller}")
     files = list((file_names.packaged_folder("policies") / name).iterdir())
     seen = found.env.observation.history  # of how many steps: the first layer is as wide
