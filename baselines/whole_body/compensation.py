@@ -14,7 +14,8 @@ seconds and S that of |F̂|. The first part answers a push that lasts. The secon
 that come again from one side: it stays between them, and is zero for pushes from all sides, whose
 |F̄|/S is. λ ∈ [0, 1] falls while the capture point is away from where it is to be, so that the
 recovery from a push is that of the controller without it, and returns slowly. Δ is shortened where
-c_ref would leave the support polygon but for a margin.
+c_ref would leave the support polygon but for a margin. It is a low-pass of this sum: F̂ jumps with
+the contacts' forces, and torques would with it.
 """
 
 from dataclasses import dataclass, field, replace
@@ -37,7 +38,6 @@ from poise.envs.physics.kinematics import (
 )
 from poise.envs.sensing.push_force import (
     MEMORY,
-    SMOOTHING,
     PushForce,
     forget_pushes,
     observe_push,
@@ -57,7 +57,8 @@ class ForceCompensation:
     """Gains of `compensation.py`, without units: lengths in h, times in 1/ω, forces in m g."""
 
     gain: float = _number(1.0, min=0.0, max=3.0)  # k of F̂
-    smoothing: float = _number(SMOOTHING, min=0.0)  # τ of F̂ [1/ω]
+    smoothing: float = _number(0.35, min=0.0)  # τ of F̂ [1/ω]
+    settling: float = _number(0.35, min=0.0)  # of Δ, which follows F̂: contacts make F̂ jump [1/ω]
     reach: float = _number(0.07, min=0.0, max=0.5)  # d, for pushes from one side [h]
     memory: float = _number(MEMORY, above=0.0)  # T of F̄ [1/ω]
     full_at: float = _number(0.005, above=0.0)  # F₀ [m g]
@@ -78,6 +79,7 @@ class Compensation(Block):
     moved: TargetArrays  # the same but for CoM and CoP, which are arrays of their own
     push: PushForce
     period: float  # [s]
+    part: float  # of a tick of the low-pass of Δ
     gain: float
     reach: float  # [m]
     full_at: float  # [N]
@@ -104,7 +106,8 @@ def make_compensation(
     made = Compensation.allocate(
         active=active, observes=observes, robot=robot, state=state, given=given, moved=moved,
         push=push_force(omega, c.smoothing, c.memory),
-        period=period, gain=c.gain, reach=c.reach * h, full_at=c.full_at * force,
+        period=period, part=period / (c.settling / omega + period),
+        gain=c.gain, reach=c.reach * h, full_at=c.full_at * force,
         release=c.release * h, return_time=c.return_time / omega, margin=c.margin * h,
     )  # fmt: skip
     forget_compensation(made)
@@ -155,7 +158,8 @@ def set_shift(c: Compensation) -> None:
         one_sided = min(mean / push.size, 1.0)
         lasting = c.share * c.reach * min(mean / c.full_at, 1.0) * one_sided / mean
     for a in range(2):
-        c.shift[a] = -per_force * push.force[a] - lasting * push.mean[a]
+        asked = -per_force * push.force[a] - lasting * push.mean[a]
+        c.shift[a] += c.part * (asked - c.shift[a])
 
 
 @compiled
