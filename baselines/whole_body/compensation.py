@@ -14,8 +14,8 @@ seconds and S that of |F̂|. The first part answers a push that lasts. The secon
 that come again from one side: it stays between them, and is zero for pushes from all sides, whose
 |F̄|/S is. λ ∈ [0, 1] falls while the capture point is away from where it is to be, so that the
 recovery from a push is that of the controller without it, and returns slowly. Δ is shortened where
-c_ref would leave the support polygon but for a margin. It is a low-pass of this sum: F̂ jumps with
-the contacts' forces, and torques would with it.
+c_ref would leave the support polygon but for a margin. F̂ passes two low-passes, since it jumps with
+the contacts' forces, and torques would jump with it.
 """
 
 from dataclasses import dataclass, field, replace
@@ -58,7 +58,7 @@ class ForceCompensation:
 
     gain: float = _number(1.0, min=0.0, max=3.0)  # k of F̂
     smoothing: float = _number(0.35, min=0.0)  # τ of F̂ [1/ω]
-    settling: float = _number(0.35, min=0.0)  # of Δ, which follows F̂: contacts make F̂ jump [1/ω]
+    settling: float = _number(0.35, min=0.0)  # of the second low-pass [1/ω]
     reach: float = _number(0.07, min=0.0, max=0.5)  # d, for pushes from one side [h]
     memory: float = _number(MEMORY, above=0.0)  # T of F̄ [1/ω]
     full_at: float = _number(0.005, above=0.0)  # F₀ [m g]
@@ -79,13 +79,14 @@ class Compensation(Block):
     moved: TargetArrays  # the same but for CoM and CoP, which are arrays of their own
     push: PushForce
     period: float  # [s]
-    part: float  # of a tick of the low-pass of Δ
+    part: float  # of a tick, of the second low-pass
     gain: float
     reach: float  # [m]
     full_at: float  # [N]
     release: float  # [m]
     return_time: float  # [s]
     margin: float  # [m]
+    force: Annotated[np.ndarray, 2]  # F̂ after the second low-pass [N], world
     shift: Annotated[np.ndarray, 2]  # Δ [m], world
     share: Mutable[float]  # λ
 
@@ -125,7 +126,7 @@ def rebound(c: Compensation, state: StateArrays, given: TargetArrays) -> Compens
 def forget_compensation(c: Compensation) -> None:
     """Start an episode."""
     forget_pushes(c.push)
-    c.shift[:] = 0.0
+    c.force[:] = c.shift[:] = 0.0
     c.share = 1.0
 
 
@@ -158,8 +159,8 @@ def set_shift(c: Compensation) -> None:
         one_sided = min(mean / push.size, 1.0)
         lasting = c.share * c.reach * min(mean / c.full_at, 1.0) * one_sided / mean
     for a in range(2):
-        asked = -per_force * push.force[a] - lasting * push.mean[a]
-        c.shift[a] += c.part * (asked - c.shift[a])
+        c.force[a] += c.part * (push.force[a] - c.force[a])
+        c.shift[a] = -per_force * c.force[a] - lasting * push.mean[a]
 
 
 @compiled

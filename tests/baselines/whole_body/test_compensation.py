@@ -13,6 +13,7 @@ from poise.baselines.whole_body.compensation import (
     ForceCompensation,
     compensate,
     keep_supported,
+    set_shift,
 )
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.errors import ConfigError
@@ -149,7 +150,7 @@ def test_other_solvers_lean_too():
     qp = MomentumQP(ROBOT, config)
     c = qp.compensation(simulation.state, targets)
     qp.torques(simulation.state, targets)
-    c.push.force[1] = 20.0
+    c.push.force[1] = c.force[1] = 20.0
     qp.torques(simulation.state, targets)
     assert c.moved.com[1] < targets.com[1] - 0.01
 
@@ -163,7 +164,7 @@ def test_controllers_that_step_lean_while_they_stand_and_watch_while_they_step(n
     assert env.stepper.steps == 0
     standing = env.stepper.qp.compensation(env.state_source.state, env.targets)
     assert standing.shift[1] < -0.03 and abs(standing.shift[0]) < 0.02
-    env = played(config, {**push, "force": 120.0}, 1.2, ResidualStepEnv)
+    env = played(config, {**push, "force": 120.0}, 0.7, ResidualStepEnv)
     assert env.stepper.steps > 0
     seen = env.stepper.qp.compensation(env.state_source.state, env.targets).push.force
     before = seen.copy()
@@ -199,3 +200,18 @@ def test_a_soft_root_takes_less_from_nowhere(direction):
     leaning = controller_config("moskalev24-compensated")
     assert impulse_of_the_root(soft, direction) > 60.0
     assert impulse_of_the_root(leaning, direction) < 30.0
+
+
+def test_the_lean_follows_a_jump_of_the_force_through_two_low_passes():
+    """Of a step of the first one's output the first tick has the part dt/(τ + dt), the last all."""
+    _, c, _ = block()
+    c.push.force[0] = 20.0
+    set_shift(c)
+    first = c.shift[0]
+    for _ in range(400):
+        set_shift(c)
+    settled = c.shift[0]
+    assert settled < -0.02
+    assert first == pytest.approx(settled * c.part, rel=1e-3)
+    omega = Simulation(ROBOT).state.omega
+    assert c.part == pytest.approx(c.period / (0.35 / omega + c.period), rel=0.05)
