@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.baselines.walking.calibration import calibrated
+from poise.baselines.walking.calibration import CommandKnots, calibrated, calibrated_turn
 from poise.envs.balance.mdp.observation import GROUND, Terms, View
 from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.compiled.block import Block
@@ -23,8 +23,7 @@ class CommandView(Block):
     seen: View
     command: np.ndarray  # (8,) see `GaitCommand.array`
     error: np.ndarray  # (3,) see `Course`
-    knots: np.ndarray  # (4, 32, 2) and
-    count: np.ndarray  # (4,) of `Calibration.table`
+    knots: CommandKnots
 
 
 VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environment first
@@ -32,15 +31,15 @@ VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environme
 
 @VELOCITY_TERMS.add(GROUND, "0.2 ω h", "commanded velocity, ahead and to the left", "vector")
 def command_velocity(t: CommandView):
-    seen = t.seen
-    for a in range(2):
-        seen.out[a] = calibrated(t.knots, t.count, t.command, a) / seen.scales.velocity
+    seen, unit = t.seen, t.seen.scales.velocity
+    seen.out[0] = calibrated(t.knots.ahead, t.command[0]) / unit
+    seen.out[1] = calibrated(t.knots.left, t.command[1]) / unit
 
 
 @VELOCITY_TERMS.add(("z",), "0.2 ω", "commanded turning rate, to the left", "turn")
 def command_turn(t: CommandView):
     seen = t.seen
-    seen.out[0] = calibrated(t.knots, t.count, t.command, 2) / (0.2 * seen.scales.omega)
+    seen.out[0] = calibrated_turn(t.knots, t.command) / (0.2 * seen.scales.omega)
 
 
 @VELOCITY_TERMS.add(

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 
 MOST_KNOTS = 32  # of an axis, both signs together
-ROWS = ("ahead", "left", "turn", "in_place")
-TURN, IN_PLACE = 2, 3
+AXES = ("ahead", "left", "turn", "in_place")
 
 Knots = tuple[tuple[float, float], ...]
 
@@ -35,7 +35,7 @@ class Calibration:
     in_place: Knots = ()
 
     def __post_init__(self) -> None:
-        for name in ROWS:
+        for name in AXES:
             knots = getattr(self, name)
             if not knots:
                 continue
@@ -46,7 +46,7 @@ class Calibration:
                 raise ValueError(f"{name}: needs the knot [0, 0], at which it stands")
             if name != "ahead" and commands[0] != 0.0:
                 raise ValueError(f"{name}: must begin with [0, 0]; both sides are alike")
-        if any(len(self._both(name)) > MOST_KNOTS for name in ROWS):
+        if any(len(self._both(name)) > MOST_KNOTS for name in AXES):
             raise ValueError(f"at most {MOST_KNOTS} knots in an axis")
 
     def _both(self, name: str) -> Knots:
@@ -56,20 +56,25 @@ class Calibration:
             return knots
         return (*((-c, -u) for c, u in reversed(knots[1:])), *knots)
 
-    def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the knots (4, 32, 2) of `ROWS`, and how many of each count (4,)."""
-        table, count = np.zeros((len(ROWS), MOST_KNOTS, 2)), np.zeros(len(ROWS))
-        for a, name in enumerate(ROWS):
-            knots = self._both(name)
-            count[a] = len(knots)
-            if knots:
-                table[a, : len(knots)] = knots
-        return table, count
+    def knots(self) -> "CommandKnots":
+        """Return the knots of both signs, for compiled code."""
+        return CommandKnots(*(np.array(self._both(name), float).reshape(-1, 2) for name in AXES))
+
+
+@dataclass(frozen=True, eq=False)
+class CommandKnots(Block):
+    """The knots (n, 2) of each axis of a `Calibration`, of both signs; (0, 2) without any."""
+
+    ahead: np.ndarray
+    left: np.ndarray
+    turn: np.ndarray
+    in_place: np.ndarray
 
 
 @compiled
-def through(knots: np.ndarray, n: int, command: float) -> float:
-    """f(command) of the first `n` of the knots (m, 2)."""
+def calibrated(knots: np.ndarray, command: float) -> float:
+    """f(command) of an axis with these knots (n, 2)."""
+    n = knots.shape[0]
     if n == 0:
         return command
     if command <= knots[0, 0]:
@@ -82,9 +87,7 @@ def through(knots: np.ndarray, n: int, command: float) -> float:
 
 
 @compiled
-def calibrated(table: np.ndarray, count: np.ndarray, command: np.ndarray, axis: int) -> float:
-    """f of an axis of the command (≥ 3,); table and count are those of `Calibration.table`."""
-    row = axis
-    if axis == TURN and count[IN_PLACE] > 0.0 and command[0] == 0.0 and command[1] == 0.0:
-        row = IN_PLACE
-    return through(table[row], int(count[row]), command[axis])
+def calibrated_turn(knots: CommandKnots, command: np.ndarray) -> float:
+    """f of the turn rate of a command (≥ 3,): ahead, left, turn."""
+    in_place = knots.in_place.shape[0] > 0 and command[0] == 0.0 and command[1] == 0.0
+    return calibrated(knots.in_place if in_place else knots.turn, command[2])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.velocity import VelocityEnv
-from poise.baselines.walking.calibration import Calibration, calibrated
+from poise.baselines.walking.calibration import Calibration, calibrated, calibrated_turn
 from tests.support.shared import robot
 
 KNOTS = Calibration(
@@ -17,7 +17,10 @@ KNOTS = Calibration(
 def f(axis, command, walking=0.3):
     commands = np.full(8, walking)
     commands[axis] = command
-    return calibrated(*KNOTS.table(), commands, axis)
+    knots = KNOTS.knots()
+    if axis == 2:
+        return calibrated_turn(knots, commands)
+    return calibrated(knots.left if axis else knots.ahead, command)
 
 
 def test_it_goes_through_its_knots():
