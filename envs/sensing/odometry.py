@@ -147,9 +147,10 @@ def keep_velocity(o: Odometry, row: int):
             accel += o.axes[a, b] * r.force[row, b]
         o.v[a] += dt * accel
         o.position[a] += dt * o.v[a]
-    o.var_v += dt * (2.0 * o.cov_vb + dt * o.var_b) + (o.acceleration_noise * dt) ** 2
-    o.cov_vb += dt * o.var_b
-    o.var_b += dt * o.bias_walk**2
+    vv, vb, bb = o.var_v, o.cov_vb, o.var_b
+    o.var_v = vv + dt * (2.0 * vb + dt * bb) + (o.acceleration_noise * dt) ** 2
+    o.cov_vb = vb + dt * bb
+    o.var_b = bb + dt * o.bias_walk**2
     place_pressure(o, row)
     for i in range(o.state.contacts.shape[0]):
         if r.found[row, i] > 0.0 and o.share[i] > 0.0:
@@ -226,10 +227,11 @@ def correct(o: Odometry, row: int, i: int):
     doubt = o.slip**2 + o.roll_radius**2 * turning
     doubt += o.rate_noise**2 * reach
     doubt /= o.share[i] ** 2
-    gain, gain_bias = o.var_v / (o.var_v + doubt), o.cov_vb / (o.var_v + doubt)
-    o.var_b -= gain_bias * o.cov_vb
-    o.var_v *= 1.0 - gain
-    o.cov_vb *= 1.0 - gain
+    vv, vb = o.var_v, o.cov_vb
+    gain, gain_bias = vv / (vv + doubt), vb / (vv + doubt)
+    o.var_b -= gain_bias * vb
+    o.var_v = vv * (1.0 - gain)
+    o.cov_vb = vb * (1.0 - gain)
     for a in range(3):
         error = -sole_v[a] - o.v[a]
         o.v[a] += gain * error

@@ -13,7 +13,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, turned
 
-from .blocks import PerformTick
+from .blocks import Performance, PerformTick
 
 
 @compiled
@@ -103,13 +103,20 @@ def face(t: PerformTick) -> None:
 def turn_to_world(t: PerformTick) -> None:
     """Turn CoM, places and δ to the world, and move CoM and places there."""
     p = t.performance
-    for rows in (p.com, p.places[0], p.places[1], p.momentum_offset):
-        for r in range(3):
-            rows[r, 0], rows[r, 1] = turned(p.cos, p.sin, rows[r, 0], rows[r, 1])
-    for place in (p.com[0], p.places[0, 0], p.places[1, 0]):
-        place[0] += p.x
-        place[1] += p.y
-        place[2] += p.floor
+    for rows in (p.com, p.places[0], p.places[1]):
+        turn_rows(p, rows)
+        rows[0, 0] += p.x
+        rows[0, 1] += p.y
+        rows[0, 2] += p.floor
+    turn_rows(p, p.momentum_offset)
+
+
+@compiled
+def turn_rows(p: Performance, rows: np.ndarray) -> None:
+    """Turn vectors (3, ≥ 2) from the motion's frame to the world's axes."""
+    for r in range(3):
+        x, y = rows[r, 0], rows[r, 1]
+        rows[r, 0], rows[r, 1] = turned(p.cos, p.sin, x, y)
 
 
 @compiled
