@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from poise.configs.errors import ConfigError
 from poise.configs.problems import Problem
 
 
@@ -28,4 +29,26 @@ def refused(
     assert source is None or found.source == source, found
     assert choices is None or found.choices == tuple(choices), found
     assert {name: found.facts.get(name) for name in facts} == facts, found
+    assert "\n" not in str(found)
+
+
+@contextmanager
+def invalid(
+    field: str | None,
+    *values: str,
+    source: str | None = None,
+    choices: Iterable[str] = (),
+) -> Iterator[pytest.ExceptionInfo[ConfigError]]:
+    """A block that raises a ConfigError of this field, in one line.
+
+    `values` are what its message holds: names, numbers, files. Its source may have folders before
+    `source`, and there may be more `choices`.
+    """
+    with pytest.raises(ConfigError) as caught:
+        yield caught
+    found = caught.value
+    assert found.field == field, found
+    assert all(value in found.message for value in values), found
+    assert source is None or str(found.source).endswith(source), found
+    assert set(choices) <= set(found.choices or ()), found
     assert "\n" not in str(found)
