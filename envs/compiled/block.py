@@ -43,8 +43,8 @@ class Block:
     both sides. A number that changes is a `Mutable[float]`, `Mutable[int]` or `Mutable[bool]`:
     `block.clock += dt` in Python and in compiled code. Nothing else can be assigned. A block
     is `@dataclass(eq=False)` if it has such numbers, else `@dataclass(frozen=True, eq=False)`.
-    To a dataclass such a number is an `InitVar`, so `dataclasses.replace`, which could only copy it,
-    raises a ValueError; the block's own `replace` shares it.
+    To a dataclass such a number is an `InitVar`: `dataclasses.replace`, which could only copy it,
+    raises a ValueError, and the block's own `replace` shares it.
 
     A block must outlive the compiled calls that use it: it holds its arrays.
     """

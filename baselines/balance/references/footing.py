@@ -50,8 +50,8 @@ class Footing(Copyable):
     rest.
 
     Attributes:
-        knots: (k+1,) [s]; coeffs: (k, 4, 20), see `splines.piecewise` and `name_columns`. δ is how far
-            c − c̈/ω² is from the ZMP: L̇, turned by a right angle, over m (g + c̈_z) [m].
+        knots: (k+1,) [s]; coeffs: (k, 4, 20), see `splines.piecewise` and `name_columns`. δ is how
+            far c − c̈/ω² is from the ZMP: L̇, turned by a right angle, over m (g + c̈_z) [m].
         switches: (n,) rising times [s] at which the planted soles change.
         planted: (n+1, 2) int: 1 where a sole is, before the first of these times, between them,
             and after the last.
@@ -80,7 +80,11 @@ class Footing(Copyable):
 
 @compiled
 def name_columns(
-    rows: np.ndarray, com: np.ndarray, root: np.ndarray, places: np.ndarray, turns: np.ndarray,
+    rows: np.ndarray,
+    com: np.ndarray,
+    root: np.ndarray,
+    places: np.ndarray,
+    turns: np.ndarray,
     momentum_offset: np.ndarray,
 ):
     """Copy rows (3, 20) of position, velocity and acceleration into arrays by what they are of:
