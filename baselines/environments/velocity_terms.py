@@ -5,7 +5,12 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.baselines.walking.calibration import CommandKnots, calibrated, calibrated_turn
+from poise.baselines.walking.calibration import (
+    CalibrationArrays,
+    observed_ahead,
+    observed_left,
+    observed_turn,
+)
 from poise.envs.balance.mdp.observation import GROUND, Terms, View
 from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.compiled.block import Block
@@ -23,7 +28,14 @@ class CommandView(Block):
     seen: View
     command: np.ndarray  # (8,) see `GaitCommand.array`
     error: np.ndarray  # (3,) see `Course`
-    knots: CommandKnots
+    calibration: CalibrationArrays
+
+
+@compiled
+def stands_still(t: CommandView) -> bool:
+    """Whether the robot has to begin to walk, see `Calibration`."""
+    rates = t.seen.state.qvel[6:]
+    return np.sqrt(np.mean(rates * rates)) < t.calibration.still
 
 
 VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environment first
@@ -31,15 +43,16 @@ VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environme
 
 @VELOCITY_TERMS.add(GROUND, "0.2 ω h", "commanded velocity, ahead and to the left", "vector")
 def command_velocity(t: CommandView):
-    seen, unit = t.seen, t.seen.scales.velocity
-    seen.out[0] = calibrated(t.knots.ahead, t.command[0]) / unit
-    seen.out[1] = calibrated(t.knots.left, t.command[1]) / unit
+    seen, unit, still = t.seen, t.seen.scales.velocity, stands_still(t)
+    seen.out[0] = observed_ahead(t.calibration, t.command, still) / unit
+    seen.out[1] = observed_left(t.calibration, t.command, still) / unit
 
 
 @VELOCITY_TERMS.add(("z",), "0.2 ω", "commanded turning rate, to the left", "turn")
 def command_turn(t: CommandView):
     seen = t.seen
-    seen.out[0] = calibrated_turn(t.knots, t.command) / (0.2 * seen.scales.omega)
+    turn = observed_turn(t.calibration, t.command, stands_still(t))
+    seen.out[0] = turn / (0.2 * seen.scales.omega)
 
 
 @VELOCITY_TERMS.add(

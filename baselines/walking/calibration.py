@@ -1,7 +1,7 @@
 """The command as a policy observes it: what it must be asked for so that the robot does as
 commanded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 
 MOST_KNOTS = 32  # of an axis, both signs together
-AXES = ("ahead", "left", "turn", "in_place")
+AXES = ("ahead", "left", "turn", "in_place", "aside")
 
 Knots = tuple[tuple[float, float], ...]
 
@@ -20,19 +20,29 @@ class Calibration:
 
     f is piecewise linear through knots (c, f(c)), and beyond the outer ones has a slope of 1. A
     policy that walks at g(u) where it observes u follows the command with f = g⁻¹. Without knots
-    f(c) = c.
+    f(c) = c. A policy that stands at low commands, and walks on at them once it walks, has to begin:
+    where it stands still though it is commanded to walk, the axis that leads is observed as
+    sign(c) max(|f(c)|, s). The speed ahead leads, without one that to the left, without both the
+    turn.
 
     Attributes:
         ahead: Knots of the speed ahead [m/s], in the order of c.
         left: Knots of the speed to the left [m/s], of c ≥ 0 from (0, 0) on: f(−c) = −f(c).
         turn: Knots of the turn rate [rad/s], of c ≥ 0 as well.
         in_place: The same where no speed is commanded; without knots `turn` holds there too.
+        aside: Knots of the speed to the left where none ahead is commanded; without knots `left`.
+        still: Root mean square of the joint velocities [rad/s] below which the robot stands still;
+            0: never.
+        start: s of ahead, left [m/s] and turn [rad/s].
     """
 
     ahead: Knots = ()
     left: Knots = ()
     turn: Knots = ()
     in_place: Knots = ()
+    aside: Knots = ()
+    still: float = field(default=0.0, metadata={"min": 0.0})
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in AXES:
@@ -56,24 +66,30 @@ class Calibration:
             return knots
         return (*((-c, -u) for c, u in reversed(knots[1:])), *knots)
 
-    def knots(self) -> "CommandKnots":
-        """Return the knots of both signs, for compiled code."""
-        return CommandKnots(*(np.array(self._both(name), float).reshape(-1, 2) for name in AXES))
+    def arrays(self) -> "CalibrationArrays":
+        """Return the same for compiled code."""
+        knots = (np.array(self._both(name), float).reshape(-1, 2) for name in AXES)
+        return CalibrationArrays(*knots, *self.start, self.still)
 
 
 @dataclass(frozen=True, eq=False)
-class CommandKnots(Block):
-    """The knots (n, 2) of each axis of a `Calibration`, of both signs; (0, 2) without any."""
+class CalibrationArrays(Block):
+    """A `Calibration`: the knots (n, 2) of both signs, (0, 2) without any, and its starts."""
 
     ahead: np.ndarray
     left: np.ndarray
     turn: np.ndarray
     in_place: np.ndarray
+    aside: np.ndarray
+    start_ahead: float  # [m/s]
+    start_left: float  # [m/s]
+    start_turn: float  # [rad/s]
+    still: float  # [rad/s]
 
 
 @compiled
-def calibrated(knots: np.ndarray, command: float) -> float:
-    """f(command) of an axis with these knots (n, 2)."""
+def through(knots: np.ndarray, command: float) -> float:
+    """f(command) of the knots (n, 2)."""
     n = knots.shape[0]
     if n == 0:
         return command
@@ -87,7 +103,32 @@ def calibrated(knots: np.ndarray, command: float) -> float:
 
 
 @compiled
-def calibrated_turn(knots: CommandKnots, command: np.ndarray) -> float:
-    """f of the turn rate of a command (≥ 3,): ahead, left, turn."""
-    in_place = knots.in_place.shape[0] > 0 and command[0] == 0.0 and command[1] == 0.0
-    return calibrated(knots.in_place if in_place else knots.turn, command[2])
+def begun(seen: float, command: float, start: float) -> float:
+    """What is observed of the axis that leads where the robot stands still: at least `start`,
+    unless it observes 0, which is to stand."""
+    return max(abs(seen), start) * np.sign(command) if seen != 0.0 else seen
+
+
+@compiled
+def observed_ahead(c: CalibrationArrays, command: np.ndarray, still: bool) -> float:
+    """The speed ahead of a command (≥ 3,) as it is observed, by a robot that stands `still`."""
+    seen = through(c.ahead, command[0])
+    leads = command[0] != 0.0
+    return begun(seen, command[0], c.start_ahead) if still and leads else seen
+
+
+@compiled
+def observed_left(c: CalibrationArrays, command: np.ndarray, still: bool) -> float:
+    """The same of the speed to the left."""
+    aside = command[0] == 0.0
+    seen = through(c.aside if aside and c.aside.shape[0] > 0 else c.left, command[1])
+    leads = aside and command[1] != 0.0
+    return begun(seen, command[1], c.start_left) if still and leads else seen
+
+
+@compiled
+def observed_turn(c: CalibrationArrays, command: np.ndarray, still: bool) -> float:
+    """The same of the turn rate."""
+    in_place = command[0] == 0.0 and command[1] == 0.0
+    seen = through(c.in_place if in_place and c.in_place.shape[0] > 0 else c.turn, command[2])
+    return begun(seen, command[2], c.start_turn) if still and in_place else seen

@@ -4,23 +4,34 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.velocity import VelocityEnv
-from poise.baselines.walking.calibration import Calibration, calibrated, calibrated_turn
+from poise.baselines.walking.calibration import (
+    Calibration,
+    observed_ahead,
+    observed_left,
+    observed_turn,
+)
 from tests.support.shared import robot
 
 KNOTS = Calibration(
     ahead=((-0.5, -0.6), (0.0, 0.0), (0.1, 0.4), (1.0, 0.9)),
     turn=((0.0, 0.0), (0.5, 0.8)),
     in_place=((0.0, 0.0), (0.5, 0.9)),
+    aside=((0.0, 0.0), (0.5, 0.7)),
 )
+STARTS = Calibration(ahead=((0.0, 0.0), (0.1, 0.0), (1.0, 0.9)), still=0.2, start=(0.5, 0.6, 1.2))
+
+
+def seen_of(calibration, command, still):
+    """Ahead, left and turn of a command as they are observed."""
+    kernels = observed_ahead, observed_left, observed_turn
+    commands, read = np.array([*command, *np.zeros(5)]), calibration.arrays()
+    return [kernel(read, commands, still) for kernel in kernels]
 
 
 def f(axis, command, walking=0.3):
-    commands = np.full(8, walking)
+    commands = [walking] * 3
     commands[axis] = command
-    knots = KNOTS.knots()
-    if axis == 2:
-        return calibrated_turn(knots, commands)
-    return calibrated(knots.left if axis else knots.ahead, command)
+    return seen_of(KNOTS, commands, False)[axis]
 
 
 def test_it_goes_through_its_knots():
@@ -38,9 +49,48 @@ def test_both_sides_are_alike():
         assert f(2, -command) == pytest.approx(-f(2, command)) != pytest.approx(-command)
 
 
-def test_turns_in_place_have_knots_of_their_own():
-    """Where no speed is commanded; those of `turn` elsewhere."""
+def test_turns_in_place_and_steps_aside_have_knots_of_their_own():
+    """Where no speed, none ahead is commanded; those of `turn` and `left` elsewhere."""
     assert f(2, 0.5) == pytest.approx(0.8) and f(2, 0.5, walking=0.0) == pytest.approx(0.9)
+    assert f(1, 0.5) == pytest.approx(0.5) and f(1, 0.5, walking=0.0) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("command", "seen"),
+    [
+        ((0.3, 0.2, 0.4), (0.5, 0.2, 0.4)),  # ahead leads, and 0.3 is less than its start
+        ((-0.3, 0.0, 0.0), (-0.5, 0.0, 0.0)),
+        ((0.8, 0.0, 0.0), (0.7, 0.0, 0.0)),  # f(0.8) is more than the start, and is kept
+        ((0.0, -0.2, 0.4), (0.0, -0.6, 0.4)),
+        ((0.0, 0.0, -0.4), (0.0, 0.0, -1.2)),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),  # commanded to stand
+        ((0.05, 0.0, 0.0), (0.0, 0.0, 0.0)),  # f(0.05) = 0 is to stand
+    ],
+)
+def test_a_robot_that_stands_still_is_told_to_begin(command, seen):
+    """sign(c) max(|f(c)|, s) of the axis that leads, the others as they are."""
+    np.testing.assert_allclose(seen_of(STARTS, command, True), seen)
+
+
+def observed(env):
+    """The command in the observation [m/s, m/s, rad/s], by the scales of its terms."""
+    first, found = 0, {}
+    for term in env.terms:
+        found[term.name] = env.episode.observation[first : first + term.size].copy()
+        first += term.size
+    s = env.scales
+    return [*found["command_velocity"] * s.velocity, *found["command_turn"] * 0.2 * s.omega]
+
+
+@pytest.mark.parametrize(("still", "ahead"), [(100.0, 0.5), (1e-9, 0.2), (0.0, 0.2)])
+def test_it_begins_where_joints_are_slower_than_that(still, ahead):
+    """A robot that moves observes f(c), one that stands still at least the start."""
+    env = VelocityEnv(
+        robot(), pushes=None, calibration=Calibration(still=still, start=(0.5, 0.6, 1.2))
+    )
+    env.reset(seed=1, options={"command": {"ahead": 0.2, "left": 0.1}})
+    env.step_without_info(np.full(env.action_space.shape, 0.1))
+    np.testing.assert_allclose(observed(env), [ahead, 0.1, 0.0], atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -64,14 +114,7 @@ def test_a_policy_observes_it():
         env = VelocityEnv(robot(), pushes=None, duration=1.0, calibration=calibration)
         env.reset(seed=1, options={"command": {"ahead": 0.1, "left": 0.2, "turn": -0.5}})
         env.step_without_info(np.zeros(env.action_space.shape))
-        first, found = 0, {}
-        for term in env.terms:
-            found[term.name] = env.episode.observation[first : first + term.size].copy()
-            first += term.size
-        s = env.scales
-        seen.append(
-            [*found["command_velocity"] * s.velocity, *found["command_turn"] * 0.2 * s.omega]
-        )
+        seen.append(observed(env))
         np.testing.assert_allclose(env.info()["command"], [0.1, 0.2, -0.5])
         again = type(env)(**env.arguments())  # of a batch
         assert again.calibration == env.calibration

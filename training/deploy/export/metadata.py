@@ -78,8 +78,8 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
     action of 1 adds, in the unit of `action_units`. `joint_names` are the motors' joints,
     `default_joint_pos` [rad] is where they stand. A policy with servos has `joint_stiffness`
     [N·m/rad], `joint_damping` [N·m·s/rad], and `joint_hold` [rad], the target at an action of 0.
-    `command_calibration` (JSON) are the knots of a `Calibration`, through which a command goes
-    before it is observed.
+    `command_calibration` (JSON) is a `Calibration`, through which a command goes before it is
+    observed.
     """
     robot, config, made = env.robot, policy.config, actions(env)
     dofs = np.asarray(robot.motor_dofs)
