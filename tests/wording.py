@@ -2,7 +2,8 @@
 
 A text counts as wording if it has three words or more and is compared with what was printed, with
 an error's text, by the `match` of `pytest.raises` and `pytest.warns`, or as a value of `invalid`.
-Such a test breaks when a sentence is improved. What a message holds (its file, field, choices, exit code) is data.
+Such a test breaks when a sentence is improved. What a message holds (its file, field, choices, exit
+code) is data.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ class Calibration:
 
     f is piecewise linear through knots (c, f(c)), and beyond the outer ones has a slope of 1. A
     policy that walks at g(u) where it observes u follows the command with f = g⁻¹. Without knots
-    f(c) = c. A policy that stands at low commands, and walks on at them once it walks, has to begin:
-    where it stands still though it is commanded to walk, the axis that leads is observed as
+    f(c) = c. A policy that stands at low commands, and walks on at them once it walks, has to
+    begin: where it stands still though it is commanded to walk, the axis that leads is observed as
     sign(c) max(|f(c)|, s). The speed ahead leads, without one that to the left, without both the
     turn.
 
