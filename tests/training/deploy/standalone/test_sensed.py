@@ -10,7 +10,7 @@ import pytest
 
 import poise
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import PoiseError
 from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.measurement import RING
 from poise.envs.sensing.realism import load_realism
@@ -137,16 +137,16 @@ def test_at_rest_it_holds_the_robot() -> None:
 @pytest.mark.parametrize(
     ("field", "value", "said"),
     [
-        ("attitude", [2.0, 0.0, 0.0, 0.0], "quaternion of length 1"),
-        ("acceleration", [0.0, 0.0, np.nan], "3 finite numbers"),
-        ("contacts", [True], "2 finite numbers"),
-        ("joint_positions", {"knee": 0.0}, "lacks"),
-        ("ground_wrench", None, "6 finite numbers"),
+        ("attitude", [2.0, 0.0, 0.0, 0.0], "length 1"),
+        ("acceleration", [0.0, 0.0, np.nan], "3 finite"),
+        ("contacts", [True], "2 finite"),
+        ("joint_positions", {"knee": 0.0}, "abdomen_z"),
+        ("ground_wrench", None, "6 finite"),
     ],
 )
 def test_a_wrong_measurement_is_named(field: str, value: object, said: str) -> None:
     controller = poise.load_standalone("momentum-qp", robot(), realism="lab")
-    with pytest.raises(ConfigError, match=f"measurement: {field}: .*{said}"):
+    with invalid(field, said, source="measurement"):
         controller.reset(START, standing(**{field: value}))
 
 
@@ -167,7 +167,7 @@ def test_what_cannot_run_on_a_robot_is_refused() -> None:
         controller.reset(START, [])
     controller.reset(START, standing())
     controller.command()
-    with pytest.raises(ConfigError, match=f"must be {controller.measurements} measurements, not 1"):
+    with invalid("measured", str(controller.measurements), "not 1"):
         controller.command(standing())
 
 

@@ -24,7 +24,6 @@ pytest.importorskip("mjviser", reason="not installed: pip install 'poise[view]'"
 import viser
 
 from poise.baselines.walking.schedule import TimedCommand
-from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import on_terrain
 from poise.envs.terrain.arrays import surface_arrays
 from poise.envs.terrain.bumps import Bumps
@@ -475,7 +474,7 @@ def test_a_port_that_is_taken_is_told() -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(ConfigError, match=f"port: {port} on 127.0.0.1 cannot be had"):
+        with invalid("port", f"{port} on 127.0.0.1"):
             check_port("127.0.0.1", port)
     with refused("range", "port", least=0, most=65535, value="70000"):
         check_port("127.0.0.1", 70000)
