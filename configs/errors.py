@@ -90,6 +90,22 @@ class PoiseError(Exception):
         super().__init__(one_line(str(text), 4 * LONGEST_TEXT))
 
 
+class WriteError(PoiseError):
+    """A file or a folder cannot be written.
+
+    Args:
+        path: of the file or folder.
+        reason: the operating system's, or what it is instead.
+    """
+
+    def __init__(self, path: str | Path, reason: str | None) -> None:
+        self.path, self.reason = str(path), reason
+        super().__init__(f"{path}: cannot be written ({reason})")
+
+    def __reduce__(self) -> tuple[type, tuple[str, str | None]]:
+        return type(self), (self.path, self.reason)
+
+
 class PoiseWarning(UserWarning):
     """Something of a user's file is not used as it is written; the text says what instead."""
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
-from .errors import ConfigError, PoiseError, meant, shown
+from .errors import ConfigError, WriteError, meant, shown
 from .outputs import check_out_folder
 from .problems import Problem
 from .reading import is_file, is_folder
@@ -62,7 +62,7 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
     Missing folders are made.
 
     Raises:
-        PoiseError: the file cannot be written; the old content is then untouched.
+        WriteError: the file cannot be written; the old content is then untouched.
     """
     path = Path(path)
     part = path.parent / f".{path.name}.{os.getpid()}.part"
@@ -75,9 +75,9 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
         os.replace(part, path)
     except OSError as error:
         why = "it is a folder" if is_folder(path) else error.strerror
-        raise PoiseError(f"{path}: cannot be written ({why})") from None
+        raise WriteError(path, why) from None
     except ValueError:  # a NUL in its name
-        raise PoiseError(f"{path}: cannot be written (no name of a file)") from None
+        raise WriteError(path, "no name of a file") from None
     finally:
         with contextlib.suppress(OSError, ValueError):  # its folder may be a file
             part.unlink(missing_ok=True)
@@ -101,7 +101,7 @@ def new_folder(out: str | Path) -> Iterator[Path]:
 
     Raises:
         ConfigError: `out` is a file, or a folder that is not empty.
-        PoiseError: it, or what the block writes, cannot be written.
+        WriteError: it, or what the block writes, cannot be written.
     """
     out = Path(out)
     check_new_folder(out)
@@ -118,8 +118,8 @@ def new_folder(out: str | Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _writing(out: Path) -> Iterator[None]:
-    """Turn the system's error for a folder that cannot be written into a PoiseError."""
+    """Turn the system's error for a folder that cannot be written into a WriteError."""
     try:
         yield
     except OSError as error:
-        raise PoiseError(f"{out}: cannot be written ({error.strerror})") from None
+        raise WriteError(out, error.strerror) from None

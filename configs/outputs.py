@@ -4,7 +4,7 @@ import errno
 import os
 from pathlib import Path
 
-from .errors import ConfigError, PoiseError
+from .errors import ConfigError, WriteError
 from .reading import exists, is_folder, whole_path
 
 NAME = "PC_NAME_MAX"  # bytes of a name in a folder
@@ -15,7 +15,7 @@ def check_out_folder(out: str | Path, field: str = "out") -> None:
 
     Raises:
         ConfigError: it is a file, or no file can have this name.
-        PoiseError: nothing may be written there.
+        WriteError: nothing may be written there.
     """
     whole_path(out, field=field)
     if exists(out) and not is_folder(out):
@@ -26,7 +26,7 @@ def check_out_folder(out: str | Path, field: str = "out") -> None:
 def check_out_file(out: str | Path, field: str = "out") -> None:
     """Refuse a file that cannot be written; neither it nor its folder need exist yet.
 
-    Raises ConfigError and PoiseError as `check_out_folder`, ConfigError for a folder.
+    Raises ConfigError and WriteError as `check_out_folder`, ConfigError for a folder.
     """
     whole_path(out, field=field)
     if is_folder(out):
@@ -46,4 +46,4 @@ def _check_place(out: str | Path, folder: Path) -> None:
         problem = errno.ENAMETOOLONG
     else:
         return
-    raise PoiseError(f"{out}: cannot be written ({os.strerror(problem)})")
+    raise WriteError(out, os.strerror(problem))

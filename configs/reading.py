@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 from .errors import ConfigError, PoiseError, shown
+from .problems import Problem
 from .yaml_loader import DEPTH, DIGITS, Loader
 
 MIB = 1 << 20
@@ -92,7 +93,7 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
         try:
             found = os.fstat(number)
             if not stat.S_ISREG(found.st_mode):
-                raise ConfigError("cannot be read (not a regular file)", source=path)
+                raise Problem("unreadable", path, why="not a regular file")
             # as much memory is taken as may be read; files of /proc say that they are empty
             size = max(found.st_size, OF_PROC)
             with open(number, "rb", closefd=False) as file:
@@ -100,9 +101,9 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
         finally:
             os.close(number)
     except OSError as error:
-        raise ConfigError(f"cannot be read ({error.strerror})", source=path) from None
+        raise Problem("unreadable", path, why=error.strerror) from None
     except ValueError:
-        raise ConfigError("cannot be read (no name of a file)", source=path) from None
+        raise Problem("unreadable", path, why="no name of a file") from None
     if len(data) > limit:
         raise ConfigError(f"is larger than {limit / MIB:g} MiB", source=path)
     if data.startswith(POINTER):

@@ -1,8 +1,9 @@
 """`python -m tests.wording`: tests that assert on the wording of a message, by file.
 
 A text counts as wording if it has three words or more and is compared with what was printed, with
-an error's text, or by the `match` of `pytest.raises` and `pytest.warns`. Such a test breaks when a
-sentence is improved. What a message holds (its file, field, choices, exit code) is data.
+an error's text, by the `match` of `pytest.raises` and `pytest.warns`, or as a value of `invalid`.
+Such a test breaks when a sentence is improved. What a message holds (its file, field, choices, exit
+code) is data.
 """
 
 from __future__ import annotations
@@ -42,6 +43,9 @@ def on_wording(function: ast.FunctionDef) -> bool:
     for node in ast.walk(function):
         if isinstance(node, ast.keyword) and node.arg == "match":
             if is_wording(node.value) or (given and names(node.value)):
+                return True
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("invalid", "refused"):
+            if is_wording(node) or (given and any(isinstance(a, ast.Starred) for a in node.args)):
                 return True
         if isinstance(node, ast.Assert) and names(node) & PRINTED:
             if is_wording(node.test) or (given and isinstance(node.test, ast.Compare)):

@@ -1,7 +1,6 @@
 """A controller run in an environment: its ticks in a policy step, compiled or in Python."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,7 +119,7 @@ class ControlledEnv(CommandedEnv):
             ticks=self.ticks,
             substeps=self.control_substeps,
             episode=self.episode,
-            end=replace(self.step_end(), report=Program.of(self._reports(tick))),
+            end=self.step_end().replace(report=Program.of(self._reports(tick))),
         )
 
     def _reports(self, tick: Any) -> list[tuple[Callable[..., None], Block]]:

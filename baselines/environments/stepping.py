@@ -1,7 +1,6 @@
 """`poise/ResidualStep-v0`: the action moves the targets and the steps of a stepping controller."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -74,7 +73,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
         super()._accept(controller, base)
         self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
         self._offsets = stepper.offsets
-        self._residual = replace(self._residual, offsets=self._offsets)
+        self._residual = self._residual.replace(offsets=self._offsets)
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
         return (self._step_report,) if kind is StepView else super()._readings(kind)

@@ -99,8 +99,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
     ):
         self.command_sampler = CommandSampler() if command is None else command_sampler(command)
         self.calibration = calibration or Calibration()
-        start = np.array(self.calibration.start)
-        self._calibrated = *self.calibration.table(), start, self.calibration.still
+        self._calibrated = self.calibration.arrays()
         self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
         self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
         self._odometry, self._shift = guarded_zeros(3), guarded_zeros(3)
@@ -133,7 +132,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         return self._known_orders[:3]
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
-        read = self._known_orders, self._error, *self._calibrated, self._shift
+        read = self._known_orders, self._error, self._calibrated, self._shift
         return read if kind is CommandView else super()._readings(kind)
 
     def _step_members(self) -> dict[str, Any]:

@@ -5,7 +5,12 @@ from typing import Annotated
 
 import numpy as np
 
-from poise.baselines.walking.calibration import begun, calibrated
+from poise.baselines.walking.calibration import (
+    CalibrationArrays,
+    observed_ahead,
+    observed_left,
+    observed_turn,
+)
 from poise.baselines.walking.correction import turn_rate
 from poise.envs.balance.mdp.observation import GROUND, Terms, View
 from poise.envs.balance.mdp.terms import TERMS
@@ -22,21 +27,15 @@ class CommandView(Block):
     seen: View
     command: np.ndarray  # (8,) see `GaitCommand.array`
     error: np.ndarray  # (3,) see `Course`
-    knots: np.ndarray  # (5, 32, 2) and
-    count: np.ndarray  # (5,) of `Calibration.table`
-    start: np.ndarray  # (3,) and
-    still: float  # of the same `Calibration`
+    calibration: CalibrationArrays
     shift: np.ndarray  # (3,) of a `Correction`
 
 
 @compiled
-def observed(t: CommandView, axis: int) -> float:
-    """An axis of the command as it is observed, see `Calibration`."""
-    seen = calibrated(t.knots, t.count, t.command, axis, t.shift[axis])
+def stands_still(t: CommandView) -> bool:
+    """Whether the robot has to begin to walk, see `Calibration`."""
     rates = t.seen.state.qvel[6:]
-    if np.sqrt(np.mean(rates * rates)) < t.still:
-        seen = begun(seen, t.command, axis, t.start[axis])
-    return seen
+    return np.sqrt(np.mean(rates * rates)) < t.calibration.still
 
 
 VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environment first
@@ -44,15 +43,16 @@ VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environme
 
 @VELOCITY_TERMS.add(GROUND, "0.2 ω h", "commanded velocity, ahead and to the left", "vector")
 def command_velocity(t: CommandView):
-    seen = t.seen
-    for a in range(2):
-        seen.out[a] = observed(t, a) / seen.scales.velocity
+    seen, unit, still = t.seen, t.seen.scales.velocity, stands_still(t)
+    seen.out[0] = observed_ahead(t.calibration, t.command, still, t.shift[0]) / unit
+    seen.out[1] = observed_left(t.calibration, t.command, still, t.shift[1]) / unit
 
 
 @VELOCITY_TERMS.add(("z",), "0.2 ω", "commanded turning rate, to the left", "turn")
 def command_turn(t: CommandView):
     seen = t.seen
-    seen.out[0] = observed(t, 2) / (0.2 * seen.scales.omega)
+    turn = observed_turn(t.calibration, t.command, stands_still(t), t.shift[2])
+    seen.out[0] = turn / (0.2 * seen.scales.omega)
 
 
 @VELOCITY_TERMS.add(

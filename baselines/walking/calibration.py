@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 
 MOST_KNOTS = 32  # of an axis, both signs together
-ROWS = ("ahead", "left", "turn", "in_place", "aside")
-AHEAD, LEFT, TURN, IN_PLACE, ASIDE = range(5)
+AXES = ("ahead", "left", "turn", "in_place", "aside")
 
 Knots = tuple[tuple[float, float], ...]
 
@@ -20,8 +20,8 @@ class Calibration:
 
     f is piecewise linear through knots (c, f(c)), and beyond the outer ones has a slope of 1. A
     policy that walks at g(u) where it observes u follows the command with f = g⁻¹. Without knots
-    f(c) = c. A policy that stands at low commands, and walks on at them once it walks, has to begin:
-    where it stands still though it is commanded to walk, the axis that leads is observed as
+    f(c) = c. A policy that stands at low commands, and walks on at them once it walks, has to
+    begin: where it stands still though it is commanded to walk, the axis that leads is observed as
     sign(c) max(|f(c)|, s). The speed ahead leads, without one that to the left, without both the
     turn.
 
@@ -47,7 +47,7 @@ class Calibration:
     correction: float = field(default=0.0, metadata={"min": 0.0, "max": 5.0})
 
     def __post_init__(self) -> None:
-        for name in ROWS:
+        for name in AXES:
             knots = getattr(self, name)
             if not knots:
                 continue
@@ -58,7 +58,7 @@ class Calibration:
                 raise ValueError(f"{name}: needs the knot [0, 0], at which it stands")
             if name != "ahead" and commands[0] != 0.0:
                 raise ValueError(f"{name}: must begin with [0, 0]; both sides are alike")
-        if any(len(self._both(name)) > MOST_KNOTS for name in ROWS):
+        if any(len(self._both(name)) > MOST_KNOTS for name in AXES):
             raise ValueError(f"at most {MOST_KNOTS} knots in an axis")
 
     def _both(self, name: str) -> Knots:
@@ -68,20 +68,31 @@ class Calibration:
             return knots
         return (*((-c, -u) for c, u in reversed(knots[1:])), *knots)
 
-    def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the knots (5, 32, 2) of `ROWS`, and how many of each count (5,)."""
-        table, count = np.zeros((len(ROWS), MOST_KNOTS, 2)), np.zeros(len(ROWS))
-        for a, name in enumerate(ROWS):
-            knots = self._both(name)
-            count[a] = len(knots)
-            if knots:
-                table[a, : len(knots)] = knots
-        return table, count
+    def arrays(self) -> "CalibrationArrays":
+        """Return the same for compiled code."""
+        knots = (np.array(self._both(name), float).reshape(-1, 2) for name in AXES)
+        return CalibrationArrays(*knots, *self.start, self.still)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationArrays(Block):
+    """A `Calibration`: the knots (n, 2) of both signs, (0, 2) without any, and its starts."""
+
+    ahead: np.ndarray
+    left: np.ndarray
+    turn: np.ndarray
+    in_place: np.ndarray
+    aside: np.ndarray
+    start_ahead: float  # [m/s]
+    start_left: float  # [m/s]
+    start_turn: float  # [rad/s]
+    still: float  # [rad/s]
 
 
 @compiled
-def through(knots: np.ndarray, n: int, command: float) -> float:
-    """f(command) of the first `n` of the knots (m, 2)."""
+def through(knots: np.ndarray, command: float) -> float:
+    """f(command) of the knots (n, 2)."""
+    n = knots.shape[0]
     if n == 0:
         return command
     if command <= knots[0, 0]:
@@ -94,25 +105,39 @@ def through(knots: np.ndarray, n: int, command: float) -> float:
 
 
 @compiled
-def calibrated(
-    table: np.ndarray, count: np.ndarray, command: np.ndarray, axis: int, shift: float = 0.0
-) -> float:
-    """f(c + shift) of an axis of the command (≥ 3,); table and count as of `Calibration.table`."""
-    row = axis
-    if axis == TURN and count[IN_PLACE] > 0.0 and command[AHEAD] == 0.0 and command[LEFT] == 0.0:
-        row = IN_PLACE
-    elif axis == LEFT and count[ASIDE] > 0.0 and command[AHEAD] == 0.0:
-        row = ASIDE
-    return through(table[row], int(count[row]), command[axis] + shift)
+def begun(seen: float, command: float, start: float) -> float:
+    """What is observed of the axis that leads where the robot stands still: at least `start`,
+    unless it observes 0, which is to stand."""
+    return max(abs(seen), start) * np.sign(command) if seen != 0.0 else seen
 
 
 @compiled
-def begun(seen: float, command: np.ndarray, axis: int, start: float) -> float:
-    """What is observed of an axis where the robot stands still: at least `start` if it leads and
-    does not observe 0, which is to stand."""
-    lead = AHEAD
-    while lead < TURN and command[lead] == 0.0:
-        lead += 1
-    if axis != lead or seen == 0.0:
-        return seen
-    return max(abs(seen), start) * np.sign(command[lead])
+def observed_ahead(
+    c: CalibrationArrays, command: np.ndarray, still: bool, shift: float = 0.0
+) -> float:
+    """The speed ahead of a command (≥ 3,) as it is observed, by a robot that stands `still` or not;
+    `shift` is δ of a `Correction`."""
+    seen = through(c.ahead, command[0] + shift)
+    leads = command[0] != 0.0
+    return begun(seen, command[0], c.start_ahead) if still and leads else seen
+
+
+@compiled
+def observed_left(
+    c: CalibrationArrays, command: np.ndarray, still: bool, shift: float = 0.0
+) -> float:
+    """The same of the speed to the left."""
+    aside = command[0] == 0.0
+    seen = through(c.aside if aside and c.aside.shape[0] > 0 else c.left, command[1] + shift)
+    leads = aside and command[1] != 0.0
+    return begun(seen, command[1], c.start_left) if still and leads else seen
+
+
+@compiled
+def observed_turn(
+    c: CalibrationArrays, command: np.ndarray, still: bool, shift: float = 0.0
+) -> float:
+    """The same of the turn rate."""
+    in_place = command[0] == 0.0 and command[1] == 0.0
+    seen = through(c.in_place if in_place and c.in_place.shape[0] > 0 else c.turn, command[2] + shift)
+    return begun(seen, command[2], c.start_turn) if still and in_place else seen

@@ -18,7 +18,7 @@ c_ref would leave the support polygon but for a margin. F̂ passes two low-passe
 the contacts' forces, and torques would jump with it.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
@@ -103,7 +103,7 @@ def make_compensation(
     targets are those that are given."""
     active, c = config is not None, config or ForceCompensation()
     h, omega, force = robot.units.height, robot.units.omega, robot.units.force
-    moved = replace(given, com=guarded_zeros(3), cop=guarded_zeros(2)) if active else given
+    moved = given.replace(com=guarded_zeros(3), cop=guarded_zeros(2)) if active else given
     made = Compensation.allocate(
         active=active, observes=observes, robot=robot, state=state, given=given, moved=moved,
         push=push_force(omega, c.smoothing, c.memory),
@@ -119,7 +119,7 @@ def rebound(c: Compensation, state: StateArrays, given: TargetArrays) -> Compens
     """The same, with the same memory, of another state or other targets."""
     if c.state is state and c.given is given:
         return c
-    moved = replace(given, com=c.moved.com, cop=c.moved.cop) if c.active else given
+    moved = given.replace(com=c.moved.com, cop=c.moved.cop) if c.active else given
     return c.replace(state=state, given=given, moved=moved)
 
 

@@ -5,7 +5,7 @@ contact only. A stack of tasks says what else is asked of v̇, such as the way o
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -65,9 +65,9 @@ class ContactSets(BoundQP):
         names = [item.name for item in fields(RobotArrays)]
         names = [name for name in names if name.startswith(("sole_", "chain"))]
         picked = {name: getattr(self.arrays, name)[pick] for name in names}
-        arrays = replace(self.arrays, **picked)
+        arrays = self.arrays.replace(**picked)
         cone = self.parameters.cone[pick]  # with a row more for each sole: the bound on its load
-        p = replace(self.parameters, cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
+        p = self.parameters.replace(cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
         return ContactSet(index, arrays, p, self.new_workspace(arrays, p))
 
     def reset(self) -> None:

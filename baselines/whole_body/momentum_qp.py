@@ -1,7 +1,6 @@
 """The baseline: a momentum-based whole-body QP, solved at every control tick."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
@@ -218,7 +217,7 @@ class MomentumQP(BoundQP, CompiledController):
         elif known.targets is not t or known.parameters is not self.parameters:
             if known.targets is not t:
                 exchange_targets(known.tasks, t)
-            known = replace(known, targets=t, parameters=self.parameters)
+            known = known.replace(targets=t, parameters=self.parameters)
         self._assembly = known
         return known
 

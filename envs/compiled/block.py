@@ -6,9 +6,8 @@ its numbers, lie one after the other in memory, and only what a function uses is
 """
 
 import re
-import sys
 from collections.abc import Mapping
-from dataclasses import FrozenInstanceError, fields
+from dataclasses import FrozenInstanceError, InitVar
 from functools import cache
 from inspect import get_annotations
 from typing import Annotated, Any, ClassVar, Self, get_origin, get_type_hints
@@ -44,6 +43,8 @@ class Block:
     both sides. A number that changes is a `Mutable[float]`, `Mutable[int]` or `Mutable[bool]`:
     `block.clock += dt` in Python and in compiled code. Nothing else can be assigned. A block
     is `@dataclass(eq=False)` if it has such numbers, else `@dataclass(frozen=True, eq=False)`.
+    To a dataclass such a number is an `InitVar`: `dataclasses.replace`, which could only copy it,
+    raises a ValueError, and the block's own `replace` shares it.
 
     A block must outlive the compiled calls that use it: it holds its arrays.
     """
@@ -59,6 +60,8 @@ class Block:
             if (dtype := mutable_dtype(kind)) is not None:
                 own[name] = MutableMember(name, dtype)
                 setattr(cls, name, own[name])
+        numbers = {name: InitVar(each.dtype) for name, each in own.items()}
+        cls.__annotations__ = {**get_annotations(cls), **numbers}
         cls.mutable = {**cls.mutable, **own}
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -66,11 +69,11 @@ class Block:
             raise FrozenInstanceError(f"cannot assign {name!r} of {type(self).__name__}")
         super().__setattr__(name, value)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, *numbers: Any) -> None:
         if self.mutable and type(self).__dataclass_params__.frozen:  # type: ignore[attr-defined]
             raise TypeError(f"{type(self).__name__} has mutable numbers, and is frozen")
-        if self.mutable and sys._getframe(2).f_globals.get("__name__") == "dataclasses":
-            raise TypeError("dataclasses.replace would not share mutable numbers: use .replace")
+        for name, number in zip(self.mutable, numbers, strict=True):
+            setattr(self, name, number)
         words: list[int] = []
         members: list[tuple[str, types.Type, int]] = []
         for name, value in self.named().items():
@@ -130,7 +133,8 @@ class Block:
     def named(self) -> dict[str, Any]:
         """The fields' values by name; for a mutable number the array (1,) that holds it."""
         held = vars(self)
-        return {each.name: held[each.name] for each in fields(self)}  # type: ignore[arg-type]
+        names = type(self).__dataclass_fields__  # type: ignore[attr-defined]
+        return {name: held[name] for name in names}
 
     def members(self) -> tuple[Any, ...]:
         """The values of `named`, in order."""

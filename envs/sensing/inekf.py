@@ -23,7 +23,7 @@ from poise.envs.compiled.mutable import Mutable
 
 from .config import EstimatorConfig
 from .measurement import DRIFT_TIME
-from .odometry import LOAD, START_SPEED, Odometry, copy_axes, keep_joints, place_pressure
+from .odometry import START_SPEED, Odometry, copy_axes, keep_joints, place_pressure
 from .promises import turn_axes
 
 
@@ -242,7 +242,7 @@ def wander(f: Invariant, row: int, i: int):
     rx = axes[0, 0] * o.pressed[i, 0] + axes[0, 1] * o.pressed[i, 1]
     ry = axes[1, 0] * o.pressed[i, 0] + axes[1, 1] * o.pressed[i, 1]
     rz = axes[2, 0] * o.pressed[i, 0] + axes[2, 1] * o.pressed[i, 1]
-    doubt, load = f.lift**2, o.pressed[i, LOAD]
+    doubt, load = f.lift**2, o.share[i]
     if o.rings.found[row, i] > 0.0 and load > 0.0:
         roll = f.slide**2 + f.roll**2 * turning
         doubt = min(doubt, roll / (load * load))

@@ -18,11 +18,7 @@ from .config import EstimatorConfig
 from .measurement import Rings
 from .promises import Promises
 
-FROM_Q, FROM_DQ = 0, 1  # columns of `Odometry.gains`
-STIR, WANDER, SLIP, ROLL, JOINT_NOISE, RATE_GAIN = range(6)  # entries of `Odometry.numbers`
 LEAST = 1e-5, 1e-2  # noises of a joint's position and velocity [rad, rad/s]
-LOAD = 2  # column of `Odometry.pressed`
-VV, VB, BB = range(3)  # entries of `Odometry.variance`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 
 
@@ -40,11 +36,19 @@ class Odometry(Block):
     q: Annotated[np.ndarray, "nj"]  # [rad]
     v: Annotated[np.ndarray, "nv"]  # velocity: root's in world axes, its angular one, joints'
     bias: Annotated[np.ndarray, 3]  # of the accelerometer and the attitude, world axes [m/s²]
-    variance: Annotated[np.ndarray, 3]  # of a component of the root's v, with the bias, of that
-    pressed: Annotated[np.ndarray, "nc", 3]  # of each sole: where pressed [m], its part of the load
+    var_v: Mutable[float]  # variance of a component of the root's v [m²/s²]
+    cov_vb: Mutable[float]  # its covariance with the same component of the bias
+    var_b: Mutable[float]  # variance of that
+    pressed: Annotated[np.ndarray, "nc", 2]  # where each sole is pressed [m]
+    share: Annotated[np.ndarray, "nc"]  # of the load, that each sole bears
     sole_v: Annotated[np.ndarray, 6]  # velocity of a sole relative to a resting root [m/s, rad/s]
     gains: Annotated[np.ndarray, 2, 2]  # rows q, q̇: corrections by errors of q and q̇
-    numbers: Annotated[np.ndarray, 6]  # see STIR and its like
+    acceleration_noise: Mutable[float]  # of an error from step to step [m/s²]
+    bias_walk: Mutable[float]  # see `EstimatorConfig` for this and the next two
+    slip: Mutable[float]
+    roll_radius: Mutable[float]
+    rate_noise: Mutable[float]  # of the joints' velocities [rad/s]
+    rate_gain: Mutable[float]  # correction of the root's angular velocity
 
 
 def begin_odometry(o: Odometry, noises: dict[str, float], c: EstimatorConfig) -> None:
@@ -52,24 +56,24 @@ def begin_odometry(o: Odometry, noises: dict[str, float], c: EstimatorConfig) ->
 
     `noises` are the sensors' deviations by the names of `SensorErrors`.
     """
-    r, dt, noise = o.rings, o.robot.timestep, o.numbers
+    r, dt = o.rings, o.robot.timestep
     o.promises.clear()
     o.seen = 1
     o.position[:] = r.truth_qpos[0, :3]
     o.axes[:] = r.attitude[r.next - 1]
     o.q[:], o.v[:] = r.q.mean(axis=0), 0.0
     o.v[3:6], o.v[6:] = r.gyro.mean(axis=0), r.dq.mean(axis=0)
-    o.bias[:] = o.variance[:] = 0.0
-    o.variance[VV], o.variance[BB] = START_SPEED**2, c.bias**2
-    noise[STIR] = np.hypot(c.acceleration, noises["accelerometer_noise"])
-    noise[WANDER], noise[SLIP], noise[ROLL] = c.bias_walk, c.slip, c.roll_radius
+    o.bias[:] = 0.0
+    o.var_v, o.cov_vb, o.var_b = START_SPEED**2, 0.0, c.bias**2
+    o.acceleration_noise = np.hypot(c.acceleration, noises["accelerometer_noise"])
+    o.bias_walk, o.slip, o.roll_radius = c.bias_walk, c.slip, c.roll_radius
     q_noise, v_noise = noises["encoder_noise"], noises["velocity_noise"]
-    noise[JOINT_NOISE] = v_noise
+    o.rate_noise = v_noise
     if c.filtered:
         o.gains[:] = filter_gains(dt, c.joint_acceleration, q_noise, v_noise)
-        noise[RATE_GAIN] = rate_gain(dt, c.turn_acceleration, noises["gyro_noise"])
+        o.rate_gain = rate_gain(dt, c.turn_acceleration, noises["gyro_noise"])
     else:
-        o.gains[:], noise[RATE_GAIN] = np.eye(2), 1.0
+        o.gains[:], o.rate_gain = np.eye(2), 1.0
 
 
 @lru_cache(maxsize=256)  # a Riccati equation at each reset would take most of it
@@ -119,14 +123,14 @@ def keep_joints(o: Odometry, row: int, asked: int):
     for a in range(3):
         if promised:
             o.v[3 + a] += dt * p.rows[asked % n, 3 + a]
-        o.v[3 + a] += o.numbers[RATE_GAIN] * (r.gyro[row, a] - o.v[3 + a])
+        o.v[3 + a] += o.rate_gain * (r.gyro[row, a] - o.v[3 + a])
     for j in range(o.q.shape[0]):
         accel = p.rows[asked % n, 6 + j] if promised else 0.0
         o.q[j] += dt * (o.v[6 + j] + 0.5 * dt * accel)
         o.v[6 + j] += dt * accel
         error_q, error_v = r.q[row, j] - o.q[j], r.dq[row, j] - o.v[6 + j]
-        o.q[j] += o.gains[0, FROM_Q] * error_q + o.gains[0, FROM_DQ] * error_v
-        o.v[6 + j] += o.gains[1, FROM_Q] * error_q + o.gains[1, FROM_DQ] * error_v
+        o.q[j] += o.gains[0, 0] * error_q + o.gains[0, 1] * error_v
+        o.v[6 + j] += o.gains[1, 0] * error_q + o.gains[1, 1] * error_v
 
 
 @compiled
@@ -135,7 +139,7 @@ def keep_velocity(o: Odometry, row: int):
 
     The accelerometer leads on, v ← v + (R f + g + b) dt, and the legs correct, see `correct`.
     """
-    r, dt, P = o.rings, o.robot.timestep, o.variance
+    r, dt = o.rings, o.robot.timestep
     copy_axes(r.attitude[row], o.axes)
     for a in range(3):
         accel = o.bias[a] - (o.robot.gravity if a == 2 else 0.0)
@@ -143,12 +147,13 @@ def keep_velocity(o: Odometry, row: int):
             accel += o.axes[a, b] * r.force[row, b]
         o.v[a] += dt * accel
         o.position[a] += dt * o.v[a]
-    P[VV] += dt * (2.0 * P[VB] + dt * P[BB]) + (o.numbers[STIR] * dt) ** 2
-    P[VB] += dt * P[BB]
-    P[BB] += dt * o.numbers[WANDER] ** 2
+    vv, vb, bb = o.var_v, o.cov_vb, o.var_b
+    o.var_v = vv + dt * (2.0 * vb + dt * bb) + (o.acceleration_noise * dt) ** 2
+    o.cov_vb = vb + dt * bb
+    o.var_b = bb + dt * o.bias_walk**2
     place_pressure(o, row)
     for i in range(o.state.contacts.shape[0]):
-        if r.found[row, i] > 0.0 and o.pressed[i, LOAD] > 0.0:
+        if r.found[row, i] > 0.0 and o.share[i] > 0.0:
             correct(o, row, i)
 
 
@@ -176,7 +181,7 @@ def place_pressure(o: Odometry, row: int):
     for i in range(nc):
         alone = nc != 2 or r.found[row, 1 - i] <= 0.0
         load = 1.0 if alone else (between if i == 1 else 1.0 - between)
-        o.pressed[i, LOAD] = load if borne else 0.0
+        o.share[i] = load if borne else 0.0
         axes, px, py = s.sole_axes[i], x - s.sole_point[i, 0], y - s.sole_point[i, 1]
         for a in range(2):
             along = axes[0, a] * px + axes[1, a] * py
@@ -195,7 +200,7 @@ def correct(o: Odometry, row: int, i: int):
     point from there. The gain falls with the noise of the joints' velocities and with the sole's
     angular velocity, and rises with the sole's share of the load.
     """
-    s, P, dq, sole_v, axes = o.state, o.variance, o.rings.dq[row], o.sole_v, o.state.sole_axes[i]
+    s, dq, sole_v, axes = o.state, o.rings.dq[row], o.sole_v, o.state.sole_axes[i]
     for a in range(6):
         total = 0.0
         for b in range(3):
@@ -219,13 +224,14 @@ def correct(o: Odometry, row: int, i: int):
     for a in range(3):
         for j in range(dq.shape[0]):
             reach += s.J[6 * i + a, 6 + j] ** 2 / 3.0
-    doubt = o.numbers[SLIP] ** 2 + o.numbers[ROLL] ** 2 * turning
-    doubt += o.numbers[JOINT_NOISE] ** 2 * reach
-    doubt /= o.pressed[i, LOAD] ** 2
-    gain, gain_bias = P[VV] / (P[VV] + doubt), P[VB] / (P[VV] + doubt)
-    P[BB] -= gain_bias * P[VB]
-    P[VV] *= 1.0 - gain
-    P[VB] *= 1.0 - gain
+    doubt = o.slip**2 + o.roll_radius**2 * turning
+    doubt += o.rate_noise**2 * reach
+    doubt /= o.share[i] ** 2
+    vv, vb = o.var_v, o.cov_vb
+    gain, gain_bias = vv / (vv + doubt), vb / (vv + doubt)
+    o.var_b -= gain_bias * vb
+    o.var_v = vv * (1.0 - gain)
+    o.cov_vb = vb * (1.0 - gain)
     for a in range(3):
         error = -sole_v[a] - o.v[a]
         o.v[a] += gain * error

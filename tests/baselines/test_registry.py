@@ -13,6 +13,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.configs.schema import to_dict
 from poise.envs.sensing.realism import load_realism
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 
@@ -94,18 +95,18 @@ def test_from_where_on_is_not_handed_on(tmp_path):
 @pytest.mark.parametrize(
     ("named", "error"),
     [
-        ("nonsense", r"mine.yaml: uncertain: no such name: 'nonsense'.*walk-field"),
+        ("nonsense", ("uncertain", "'nonsense'", "walk-field")),
         (
             "momentum-qp",
-            r"mine.yaml: uncertain: 'momentum-qp' is of kind 'momentum-qp', not 'walk'",
+            ("uncertain", "'momentum-qp'", "'walk'"),
         ),
-        ("walk", r"mine.yaml: uncertain: 'walk' has an 'uncertain' of its own: 'walk-field'"),
-        ("3", r"mine.yaml: uncertain: must be text"),
+        ("walk", ("uncertain", "'walk'", "'uncertain'", "'walk-field'")),
+        ("3", ("uncertain",)),
     ],
 )
 def test_what_cannot_take_its_place_is_refused(tmp_path, named, error):
     """As soon as the file is read, whatever the level."""
     path = tmp_path / "mine.yaml"
     path.write_text(f"base: walk-field\nuncertain: {named}\n")
-    with pytest.raises(ConfigError, match=error):
+    with invalid(*error):
         controller_config(path)

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from poise.configs import outputs
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import WriteError
 from poise.configs.outputs import check_out_file, check_out_folder
+from tests.support.refused import invalid
 
 
 def test_what_can_be_written_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -25,14 +26,15 @@ def test_the_wrong_kind(tmp_path: Path) -> None:
     """A file is no folder, a folder no file, and in a file there is nothing."""
     file = tmp_path / "file"
     file.write_text("mine")
-    with pytest.raises(ConfigError, match="file: out: is not a folder"):
+    with invalid("out", source="file"):
         check_out_folder(file)
-    with pytest.raises(ConfigError, match="plot: is a folder: name a file"):
+    with invalid("plot", source=str(tmp_path)):
         check_out_file(tmp_path, "plot")
     for check in (check_out_folder, check_out_file):
-        with pytest.raises(PoiseError, match="file/a/b: cannot be written .Not a directory"):
+        with pytest.raises(WriteError) as caught:
             check(file / "a/b")
-        with pytest.raises(ConfigError, match="out: is no name of a file"):
+        assert (caught.value.path, caught.value.reason) == (str(file / "a/b"), "Not a directory")
+        with invalid("out", r"'a\x00b'"):
             check("a\0b")
 
 
@@ -46,6 +48,7 @@ def test_where_nothing_may_be_written(tmp_path: Path, monkeypatch: pytest.Monkey
         return False
 
     monkeypatch.setattr(outputs.os, "access", access)
-    with pytest.raises(PoiseError, match="a/b: cannot be written .Permission denied"):
+    with pytest.raises(WriteError) as caught:
         check_out_folder(tmp_path / "a/b")
+    assert (caught.value.path, caught.value.reason) == (str(tmp_path / "a/b"), "Permission denied")
     assert asked == [tmp_path]

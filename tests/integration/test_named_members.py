@@ -10,29 +10,6 @@ FILES = [path for room in ("envs", "baselines", "training") for path in (ROOT / 
 
 #: the state of a random generator, which `uniform` and its like take by reference
 BY_REFERENCE = {"envs/physics/arms.py: seed", "envs/sensing/measurement.py: seed"}
-#: columns of one spline, whose parts are vectors; rows of a Jacobian
-SLICES = {
-    # rows of a table of knots, by axis; columns of footfalls, which are compared as arrays
-    "baselines/walking/calibration.py": {"TURN", "IN_PLACE"},
-    "baselines/balance/references/footfalls.py": {"TIME", "FOOT", "AHEAD", "COLUMNS"},
-    "baselines/balance/references/footing.py": {"COM", "ROOT", "PLACE", "TURN", "SPIN", "COLUMNS"},
-    "baselines/balance/stepping/planning/swing_speed.py": {"ROLL", "PITCH"},
-    # apart, its noises are multiplied and added in another order: the last bit of an estimate moves
-    "envs/sensing/odometry.py": {
-        "FROM_Q",
-        "FROM_DQ",
-        "STIR",
-        "WANDER",
-        "SLIP",
-        "ROLL",
-        "JOINT_NOISE",
-        "RATE_GAIN",
-        "LOAD",
-        "VV",
-        "VB",
-        "BB",
-    },
-}
 
 
 def has_one_entry(annotation: ast.expr | None) -> bool:
@@ -110,7 +87,7 @@ def test_no_constant_stands_for_the_name_of_an_entry(trees: dict[str, ast.Module
     used = {path: (in_indices(tree), imports(tree)) for path, tree in trees.items()}
     found = []
     for source, tree in trees.items():
-        for name in index_names(tree) - SLICES.get(source, set()):
+        for name in index_names(tree):
             for path, (indices, imported) in used.items():
                 local = name if path == source else imported.get((Path(source).stem, name))
                 if local in indices:

@@ -11,6 +11,7 @@ from poise.baselines.controller import BaseController, Targets
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.errors import ConfigError
+from poise.envs.compiled.maths.easing import eased
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.mirror import mirror_robot
@@ -175,7 +176,7 @@ class GetUp(BaseController):
         goal, begin, clock = self.start, self.start, self.clock
         for key, posture in self.script:
             if clock < key.move:
-                goal = begin + eased_cubic(clock / key.move) * (posture - begin)
+                goal = begin + eased(clock / key.move) * (posture - begin)
                 break
             clock -= key.move
             goal = begin = posture
@@ -188,8 +189,3 @@ class GetUp(BaseController):
         tau /= 1.0 + self.period * self.damping / own
         limit = self.robot.torque_limit
         return np.clip(tau[self._motor_joints], -limit, limit)
-
-
-def eased_cubic(s: float) -> float:
-    """3 s² − 2 s³, from 0 to 1."""
-    return s * s * (3.0 - 2.0 * s)

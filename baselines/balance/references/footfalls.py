@@ -1,18 +1,29 @@
 """Footfalls of a motion: when each foot lands, and where from the foot beside it."""
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .footing import Footing
 
-#: columns: [s], the foot's index, [m] twice in the axes of the other foot's sole
-TIME, FOOT, AHEAD, LEFT, COLUMNS = 0, 1, 2, 3, 4
+
+class Footfalls(NamedTuple):
+    """The columns of footfalls (n, 4) by name: `Footfalls(*rows.T)`."""
+
+    time: np.ndarray  #: [s]
+    foot: np.ndarray  #: its index
+    ahead: np.ndarray  #: in the axes of the other foot's sole [m]
+    left: np.ndarray  #: [m]
+
+
+COLUMNS = len(Footfalls._fields)
 
 
 def footfalls(
     times: np.ndarray, places: np.ndarray, turns: np.ndarray, planted: np.ndarray
 ) -> np.ndarray:
-    """(n, 4) the footfalls of F frames, of the columns TIME to LEFT, in order.
+    """(n, 4) the footfalls of F frames, of the columns of `Footfalls`, in order.
 
     Args:
         times: (F,) [s], rising.
@@ -39,7 +50,7 @@ def step_vector(places: np.ndarray, turns: np.ndarray, foot: int) -> np.ndarray:
 
 
 def landings(footing: Footing) -> np.ndarray:
-    """(n, 4) the footfalls of a motion with steps, of the columns TIME to LEFT."""
+    """(n, 4) the footfalls of a motion with steps, of the columns of `Footfalls`."""
     samples = [footing.sample(float(time)) for time in footing.switches]
     if not samples:
         return np.empty((0, COLUMNS))

@@ -13,15 +13,15 @@ from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.runs import runs_of
-from poise.envs.compiled.maths.vectors import rotation_vector
+from poise.envs.compiled.maths.vectors import copy_into, rotation_vector
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 
 from .splines import evaluate, piecewise, rest_spline
 
-#: columns of `Footing.coeffs`: c, φ, place and turn of either sole, then δ
-COM, ROOT, PLACE, TURN, SPIN, COLUMNS = 0, 3, (6, 12), (9, 15), 18, 20
+COLUMNS = 20  # of `Footing.coeffs`, see `name_columns`
 CREEP = 0.01  # [m] by which a planted sole may be elsewhere than in the middle of its stance
 FLAT = 0.05  # [rad] by which it may be turned from there
 LIGHT = 0.7  # [m g] of the force on the ground: where it is less, the ZMP says nothing
@@ -50,8 +50,8 @@ class Footing(Copyable):
     rest.
 
     Attributes:
-        knots: (k+1,) [s]; coeffs: (k, 4, 20), see `splines.piecewise` and COM to SPIN. δ is how far
-            c − c̈/ω² is from the ZMP: L̇, turned by a right angle, over m (g + c̈_z) [m].
+        knots: (k+1,) [s]; coeffs: (k, 4, 20), see `splines.piecewise` and `name_columns`. δ is how
+            far c − c̈/ω² is from the ZMP: L̇, turned by a right angle, over m (g + c̈_z) [m].
         switches: (n,) rising times [s] at which the planted soles change.
         planted: (n+1, 2) int: 1 where a sole is, before the first of these times, between them,
             and after the last.
@@ -64,17 +64,40 @@ class Footing(Copyable):
 
     def sample(self, t: float) -> FootingSample:
         """The motion at time t [s]."""
-        out = np.zeros((3, COLUMNS))
-        evaluate(self.knots, self.coeffs, False, t, out[0], out[1], out[2])
-        places, turns = (np.stack([out[:, a : a + 3] for a in at]) for at in (PLACE, TURN))
+        rows, (com, root), offset = np.zeros((3, COLUMNS)), np.zeros((2, 3, 3)), np.zeros((3, 2))
+        places, turns = np.zeros((2, 2, 3, 3))
+        evaluate(self.knots, self.coeffs, False, t, rows[0], rows[1], rows[2])
+        name_columns(rows, com, root, places, turns, offset)
         planted = self.planted[np.searchsorted(self.switches, t, side="right")] > 0
-        return FootingSample(out[:, :3], out[:, 3:6], places, turns, planted)
+        return FootingSample(com, root, places, turns, planted)
 
     def at_speed(self, factor: float) -> Footing:
         """The contacts of the motion `factor` > 0 times as fast; δ is its square times as large."""
         coeffs = self.coeffs * float(factor) ** np.arange(self.coeffs.shape[1])[:, None]
-        coeffs[:, :, SPIN:] *= factor**2
+        coeffs[:, :, -2:] *= factor**2
         return Footing(self.knots / factor, coeffs, self.switches / factor, self.planted)
+
+
+@compiled
+def name_columns(
+    rows: np.ndarray,
+    com: np.ndarray,
+    root: np.ndarray,
+    places: np.ndarray,
+    turns: np.ndarray,
+    momentum_offset: np.ndarray,
+):
+    """Copy rows (3, 20) of position, velocity and acceleration into arrays by what they are of:
+    c (3, 3), φ (3, 3), place and turn of either sole (2, 3, 3) each, then δ (3, 2)."""
+    for r in range(3):
+        row = rows[r]
+        copy_into(row[0:3], com[r])
+        copy_into(row[3:6], root[r])
+        for foot in range(2):
+            sole = row[6 + 6 * foot : 12 + 6 * foot]
+            copy_into(sole[0:3], places[foot, r])
+            copy_into(sole[3:6], turns[foot, r])
+        copy_into(row[18:20], momentum_offset[r])
 
 
 def check_planted(planted: np.ndarray, source: str) -> None:

@@ -26,7 +26,12 @@ class Performance(Block):
     switches: np.ndarray
     planted: np.ndarray
     pace: Pace  # of the motion's time, where it waits
-    samples: Annotated[np.ndarray, 3, COLUMNS]  # position, velocity, acceleration, in the world
+    rows: Annotated[np.ndarray, 3, COLUMNS]  # position, velocity, acceleration; then by name,
+    com: Annotated[np.ndarray, 3, 3]  # in the world
+    root: Annotated[np.ndarray, 3, 3]  # rotation vector from standing
+    places: Annotated[np.ndarray, 2, 3, 3]  # of the soles, in the world
+    turns: Annotated[np.ndarray, 2, 3, 3]  # their rotation vectors from standing
+    momentum_offset: Annotated[np.ndarray, 3, 2]  # δ, in the world
     gain: float
     margin: float  # [m]
     margin_both: float  # [m]

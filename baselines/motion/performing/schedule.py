@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.footing import COM, LIGHT, PLACE, SPIN, TURN
+from poise.baselines.balance.references.footing import LIGHT, name_columns
 from poise.baselines.balance.references.splines import evaluate
 from poise.baselines.balance.stepping.planning.cop_region import (
     double_support_region,
@@ -13,7 +13,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, turned
 
-from .blocks import PerformTick
+from .blocks import Performance, PerformTick
 
 
 @compiled
@@ -56,25 +56,25 @@ def flies(t: PerformTick, phase: int) -> bool:
 
 @compiled
 def sample_footing(t: PerformTick, time: float) -> None:
-    """The motion's CoM, root and soles, into `samples`, in the motion's frame."""
+    """The motion's CoM, root and soles, in the motion's frame."""
     p = t.performance
-    evaluate(p.knots, p.coeffs, False, time, p.samples[0], p.samples[1], p.samples[2])
+    evaluate(p.knots, p.coeffs, False, time, p.rows[0], p.rows[1], p.rows[2])
     if p.pace.waits:
         rate, change = p.pace.rate, p.pace.change
-        for j in range(p.samples.shape[1]):
-            p.samples[2, j] = rate * rate * p.samples[2, j] + change * p.samples[1, j]
-            p.samples[1, j] *= rate
+        for j in range(p.rows.shape[1]):
+            p.rows[2, j] = rate * rate * p.rows[2, j] + change * p.rows[1, j]
+            p.rows[1, j] *= rate
+    name_columns(p.rows, p.com, p.root, p.places, p.turns, p.momentum_offset)
 
 
 @compiled
 def put_frame(t: PerformTick) -> None:
     """Let the motion's frame be where its soles are as the robot's are now."""
     s, p = t.own.state, t.performance
-    feet, place = s.sole_point, p.samples[0]
+    feet, left, right = s.sole_point, p.places[0, 0], p.places[1, 0]
     yaw = heading_of(t)
     p.cos, p.sin = turned(s.heading[0], s.heading[1], np.cos(yaw), -np.sin(yaw))
-    x = 0.5 * (place[PLACE[0]] + place[PLACE[1]])
-    y = 0.5 * (place[PLACE[0] + 1] + place[PLACE[1] + 1])
+    x, y = 0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1])
     x, y = turned(p.cos, p.sin, x, y)
     p.x = 0.5 * (feet[0, 0] + feet[1, 0]) - x
     p.y = 0.5 * (feet[0, 1] + feet[1, 1]) - y
@@ -85,10 +85,10 @@ def put_frame(t: PerformTick) -> None:
 @compiled
 def heading_of(t: PerformTick) -> float:
     """The mean heading of the motion's soles, of both or of the one that bears [rad]."""
-    m, turns = t.own.memory, t.performance.samples[0]
+    m, turns = t.own.memory, t.performance.turns
     if m.swinging:
-        return turns[TURN[1 - m.foot] + 2]
-    return 0.5 * (turns[TURN[0] + 2] + turns[TURN[1] + 2])
+        return turns[1 - m.foot, 0, 2]
+    return 0.5 * (turns[0, 0, 2] + turns[1, 0, 2])
 
 
 @compiled
@@ -101,32 +101,34 @@ def face(t: PerformTick) -> None:
 
 @compiled
 def turn_to_world(t: PerformTick) -> None:
-    """Turn CoM and places of `samples` to the world."""
+    """Turn CoM, places and δ to the world, and move CoM and places there."""
     p = t.performance
-    for column in (COM, PLACE[0], PLACE[1], SPIN):
-        for r in range(3):
-            x, y = p.samples[r, column], p.samples[r, column + 1]
-            x, y = turned(p.cos, p.sin, x, y)
-            p.samples[r, column], p.samples[r, column + 1] = x, y
-        if column != SPIN:
-            p.samples[0, column] += p.x
-            p.samples[0, column + 1] += p.y
-            p.samples[0, column + 2] += p.floor
+    for rows in (p.com, p.places[0], p.places[1]):
+        turn_rows(p, rows)
+        rows[0, 0] += p.x
+        rows[0, 1] += p.y
+        rows[0, 2] += p.floor
+    turn_rows(p, p.momentum_offset)
+
+
+@compiled
+def turn_rows(p: Performance, rows: np.ndarray) -> None:
+    """Turn vectors (3, ≥ 2) from the motion's frame to the world's axes."""
+    for r in range(3):
+        x, y = rows[r, 0], rows[r, 1]
+        rows[r, 0], rows[r, 1] = turned(p.cos, p.sin, x, y)
 
 
 @compiled
 def stance_differs(t: PerformTick) -> bool:
     """Return whether the feet stand otherwise to each other than the motion's do now."""
     s, p = t.own.state, t.performance
-    feet, place = s.sole_point, p.samples[0]
+    feet, left, right = s.sole_point, p.places[0, 0], p.places[1, 0]
     x, y = along(
         s.heading[0], s.heading[1], feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1]
     )  # fmt: skip
     yaw = heading_of(t)
-    u, v = along(
-        np.cos(yaw), np.sin(yaw), place[PLACE[0]] - place[PLACE[1]],
-        place[PLACE[0] + 1] - place[PLACE[1] + 1],
-    )  # fmt: skip
+    u, v = along(np.cos(yaw), np.sin(yaw), left[0] - right[0], left[1] - right[1])
     x, y = x - u, y - v
     return np.sqrt(x * x + y * y) > p.stance_error
 
@@ -135,21 +137,20 @@ def stance_differs(t: PerformTick) -> bool:
 def squared_rate(t: PerformTick) -> float:
     """ω² = (g + c̈_z)/(c_z − ground) of the motion [1/s²]; of 0.7 g at least."""
     p = t.performance
-    height = p.samples[0, COM + 2] - p.floor
+    height = p.com[0, 2] - p.floor
     gravity = t.own.robot.gravity
-    return max(gravity + p.samples[2, COM + 2], LIGHT * gravity) / max(height, 1e-3)
+    return max(gravity + p.com[2, 2], LIGHT * gravity) / max(height, 1e-3)
 
 
 @compiled
 def wanted_cop(t: PerformTick, gain: float, out: np.ndarray) -> None:
     """p_ref + (1 + gain) (ξ − ξ_ref) into `out` (≥ 2,) [m]; p_ref = c − c̈/ω² − δ is the ZMP."""
-    s, samples = t.own.state, t.performance.samples
+    s, p = t.own.state, t.performance
     rate = squared_rate(t)
     omega = np.sqrt(rate)
     for a in range(2):
-        j = COM + a
-        error = s.com[a] - samples[0, j] + (s.com_vel[a] - samples[1, j]) / omega
-        zmp = samples[0, j] - samples[2, j] / rate - samples[0, SPIN + a]
+        error = s.com[a] - p.com[0, a] + (s.com_vel[a] - p.com[1, a]) / omega
+        zmp = p.com[0, a] - p.com[2, a] / rate - p.momentum_offset[0, a]
         out[a] = zmp + (1.0 + gain) * error
 
 

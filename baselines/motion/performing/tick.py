@@ -9,7 +9,6 @@ motion goes on from the new stance.
 
 import numpy as np
 
-from poise.baselines.balance.references.footing import COM, PLACE, ROOT, SPIN, TURN
 from poise.baselines.balance.references.targets import root_reference
 from poise.baselines.balance.stepping.planning.guidance import limit_posture
 from poise.baselines.balance.stepping.planning.swing import LANDING, start_swing
@@ -58,13 +57,12 @@ def perform_targets(t: PerformTick, corners: int) -> None:
     for a in range(2):
         own.cop[a] = c.pair[a]
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
-        own.com_acc[a] = rate * (s.com[a] - own.cop[a] - p.samples[0, SPIN + a])
-    own.com[2] = p.samples[0, COM + 2]
-    own.com_vel[2], own.com_acc[2] = p.samples[1, COM + 2], p.samples[2, COM + 2]
+        own.com_acc[a] = rate * (s.com[a] - own.cop[a] - p.momentum_offset[0, a])
+    own.com[2], own.com_vel[2], own.com_acc[2] = p.com[0, 2], p.com[1, 2], p.com[2, 2]
     copy_into(given.q_ref, own.q_ref)
     copy_into(given.v_ref, own.v_ref)
     copy_into(given.angular_momentum, own.angular_momentum)
-    root_reference(c.robot, p.cos, p.sin, p.samples[:, ROOT : ROOT + 3], own)
+    root_reference(c.robot, p.cos, p.sin, p.root, own)
     limit_posture(c)
     for j in range(own.a_ref.shape[0]):
         own.a_ref[j] += given.a_ref[j]
@@ -104,16 +102,16 @@ def begin_swing(t: PerformTick, foot: int, phase: int) -> None:
 def follow_foot(t: PerformTick) -> None:
     """Lead the swinging sole as the motion does; down, once it should have landed."""
     c, p, w, foot = t.own, t.performance, t.own.swing, t.own.memory.foot
-    place, turn = PLACE[foot], TURN[foot]
+    place, turn = p.places[foot], p.turns[foot, 0]
     late = w.time - w.duration
     for r in range(3):
         for a in range(3):
-            w.reference[r, a] = p.samples[r, place + a]
+            w.reference[r, a] = place[r, a]
     if late > 0.0:
         w.reference[0, 2] -= p.landing_speed * late
         w.reference[1, 2] = -p.landing_speed
-    w.foothold[0], w.foothold[1] = p.samples[0, place], p.samples[0, place + 1]
-    x, y, z = p.samples[0, turn], p.samples[0, turn + 1], p.samples[0, turn + 2]
+    w.foothold[0], w.foothold[1] = place[0, 0], place[0, 1]
+    x, y, z = turn[0], turn[1], turn[2]
     angle = np.sqrt(x * x + y * y + z * z)
     if angle > 1e-12:
         x, y, z = x / angle, y / angle, z / angle
@@ -152,14 +150,14 @@ def lead_soles(t: PerformTick, time: float, share: float) -> None:
     accel, damping = problem.workspace.sole_accel, problem.parameters.sole_damping
     late = max(time - p.switches[p.begun], 0.0)
     for foot in range(2):
-        up = s.sole_axes[foot, :, 2]
+        up, place = s.sole_axes[foot, :, 2], p.places[foot]
         for a in range(3):
-            j, r = PLACE[foot] + a, 6 * foot + a
-            gap = p.samples[0, j] - s.sole_point[foot, a]
+            r = 6 * foot + a
+            gap = place[0, a] - s.sole_point[foot, a]
             if a == 2:
                 gap -= p.landing_speed * late
-            rate = p.samples[1, j] - s.J_v[r]
-            accel[r] = p.samples[2, j] + AIR**2 * gap + 2.0 * AIR * rate
+            rate = place[1, a] - s.J_v[r]
+            accel[r] = place[2, a] + AIR**2 * gap + 2.0 * AIR * rate
             accel[r + 3] = -2.0 * AIR * s.J_v[r + 3]
         accel[6 * foot + 3] += AIR**2 * up[1]
         accel[6 * foot + 4] -= AIR**2 * up[0]

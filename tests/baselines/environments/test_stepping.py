@@ -12,11 +12,11 @@ from poise.baselines.balance.stepping.planning.guidance import copy_reference, g
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.configs.errors import ConfigError
 from poise.envs.balance.vector.batch import EnvBatch, replicate
 from poise.envs.compiled.maths.vectors import turn
 from poise.envs.sensing.realism import Realism, load_realism
 from tests.support import planned
+from tests.support.refused import invalid
 from tests.support.sensing import PLAIN
 from tests.support.shared import robot
 
@@ -234,7 +234,7 @@ def test_perfect_sensors_change_no_step(env):
 
 def test_controllers_that_do_not_step_are_refused():
     """The momentum QP has no steps to move."""
-    with pytest.raises(ConfigError, match="does not step"):
+    with invalid("controller"):
         ResidualStepEnv(robot(), controller="momentum-qp")
 
 

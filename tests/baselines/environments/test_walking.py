@@ -9,10 +9,9 @@ from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import CommandSampler
-from poise.configs.errors import ConfigError
 from poise.envs.physics.pushes.push import Kick
 from poise.envs.sensing.realism import load_realism
-from tests.support.refused import refused
+from tests.support.refused import invalid, refused
 from tests.support.shared import robot
 
 FAST = {"ahead": 0.4}
@@ -91,16 +90,15 @@ def test_commands_change_at_their_times(plain):
 def test_commands_need_a_controller_that_walks():
     """One line with the controllers that do; nothing else takes a command."""
     standing = ResidualBalanceEnv(robot(), pushes=None, duration=0.1)
-    with pytest.raises(ConfigError, match=r"reset: command: the controller MomentumQP does not walk"
-                       r"; give one that does \(choices: simbicon, walk"):  # fmt: skip
+    with invalid("command", "simbicon", "walk", source="reset"):
         standing.reset(options={"command": FAST})
-    with pytest.raises(ConfigError, match="environment: command: the controller MomentumQP does n"):
+    with invalid("command", source="environment"):
         standing.command = GaitCommand(0.1)
     assert standing.command is None
-    with pytest.raises(ConfigError, match=r"controller: does not walk \(choices: walk"):
+    with invalid("controller", "walk"):
         ResidualWalkEnv(robot(), controller="capture-step")
     torques = gymnasium.make("poise/TorqueBalance-v0")
-    with pytest.raises(ConfigError, match="reset: command: unknown option"):
+    with invalid("command", source="reset"):
         torques.reset(options={"command": FAST})
     walking = ResidualBalanceEnv(robot(), controller="walk", pushes=None, duration=0.1)
     with refused("unknown field", "speed", source="command"):
@@ -173,14 +171,14 @@ def test_success_is_not_to_fall(env):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ({"ahead": [0.2, 9.0]}, r"command\.ahead: 9 .* 'humanoid' supports at most .* 1\.85 m/s"),
-        ({"ahead": [-3.0, 0.5]}, r"command\.ahead: -3 m/s .* at most"),
-        ({"ahead": 0.0, "left": [-0.1, 4.0]}, r"command\.left: 4 m/s .* at most"),
+        ({"ahead": [0.2, 9.0]}, ("command.ahead", "9", "'humanoid'", "1.85 m/s")),
+        ({"ahead": [-3.0, 0.5]}, ("command.ahead", "-3 m/s")),
+        ({"ahead": 0.0, "left": [-0.1, 4.0]}, ("command.left", "4 m/s")),
     ],
 )
 def test_what_may_be_drawn_is_within_reach_when_the_environment_is_made(command, said):
     """One line with the robot's limits; nothing waits for the draw that goes wrong."""
-    with pytest.raises(ConfigError, match=said) as caught:
+    with invalid(*said) as caught:
         ResidualWalkEnv(robot(), command=command, **SHORT)
     assert "\n" not in str(caught.value)
 

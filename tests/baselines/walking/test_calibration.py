@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.velocity import VelocityEnv
-from poise.baselines.walking.calibration import Calibration, begun, calibrated
+from poise.baselines.walking.calibration import (
+    Calibration,
+    observed_ahead,
+    observed_left,
+    observed_turn,
+)
 from tests.support.shared import robot
 
 KNOTS = Calibration(
@@ -16,10 +21,17 @@ KNOTS = Calibration(
 STARTS = Calibration(ahead=((0.0, 0.0), (0.1, 0.0), (1.0, 0.9)), still=0.2, start=(0.5, 0.6, 1.2))
 
 
+def seen_of(calibration, command, still):
+    """Ahead, left and turn of a command as they are observed."""
+    kernels = observed_ahead, observed_left, observed_turn
+    commands, read = np.array([*command, *np.zeros(5)]), calibration.arrays()
+    return [kernel(read, commands, still) for kernel in kernels]
+
+
 def f(axis, command, walking=0.3):
-    commands = np.full(8, walking)
+    commands = [walking] * 3
     commands[axis] = command
-    return calibrated(*KNOTS.table(), commands, axis)
+    return seen_of(KNOTS, commands, False)[axis]
 
 
 def test_it_goes_through_its_knots():
@@ -48,23 +60,16 @@ def test_turns_in_place_and_steps_aside_have_knots_of_their_own():
     [
         ((0.3, 0.2, 0.4), (0.5, 0.2, 0.4)),  # ahead leads, and 0.3 is less than its start
         ((-0.3, 0.0, 0.0), (-0.5, 0.0, 0.0)),
-        ((0.8, 0.0, 0.0), (0.8, 0.0, 0.0)),  # more than the start is kept
+        ((0.8, 0.0, 0.0), (0.7, 0.0, 0.0)),  # f(0.8) is more than the start, and is kept
         ((0.0, -0.2, 0.4), (0.0, -0.6, 0.4)),
         ((0.0, 0.0, -0.4), (0.0, 0.0, -1.2)),
         ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),  # commanded to stand
+        ((0.05, 0.0, 0.0), (0.0, 0.0, 0.0)),  # f(0.05) = 0 is to stand
     ],
 )
 def test_a_robot_that_stands_still_is_told_to_begin(command, seen):
     """sign(c) max(|f(c)|, s) of the axis that leads, the others as they are."""
-    commands = np.array([*command, *np.zeros(5)])
-    found = [begun(commands[a], commands, a, STARTS.start[a]) for a in range(3)]
-    np.testing.assert_allclose(found, seen)
-
-
-def test_a_command_observed_as_standing_does_not_begin():
-    """f(0.05) = 0 is to stand."""
-    commands = np.array([0.05, *np.zeros(7)])
-    assert begun(calibrated(*STARTS.table(), commands, 0), commands, 0, 0.5) == 0.0
+    np.testing.assert_allclose(seen_of(STARTS, command, True), seen)
 
 
 def observed(env):

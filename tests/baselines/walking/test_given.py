@@ -8,13 +8,13 @@ from poise.baselines.registry import load_controller
 from poise.baselines.walking.config import TreadConfig
 from poise.baselines.walking.given import given_footholds
 from poise.baselines.walking.planner.command import GaitCommand
-from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.slope import Slope
 from poise.envs.terrain.stairs import Stairs
 from poise.envs.terrain.stones import Stones
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 WALK = GaitCommand(0.5)
@@ -90,16 +90,16 @@ def test_level_ground_after_stairs_is_walked_as_before_bit_for_bit(env):
 @pytest.mark.parametrize(
     ("terrain", "says"),
     [
-        (Stairs(tread=0.2), r"a tread of 0.2 m cannot be stepped: 'humanoid' needs 0.28 m"),
-        (Stairs(rise=0.3), r"a step of 0.3 m cannot be stepped: .* by at most 0.197 m"),
-        (Stairs(rise=0.3, down=True), r"a step of -0.3 m cannot be stepped"),
-        (Stones(gap=0.4), r"to the next surface cannot be stepped: .* at most 0.472 m far"),
-        (Slope(angle=20.0), r"a slope of 20° cannot be stepped: .* walks on up to 10°"),
+        (Stairs(tread=0.2), ("terrain", "0.2 m", "'humanoid'", "0.28 m")),
+        (Stairs(rise=0.3), ("terrain", "0.3 m", "0.197 m")),
+        (Stairs(rise=0.3, down=True), ("terrain", "-0.3 m")),
+        (Stones(gap=0.4), ("terrain", "0.472 m")),
+        (Slope(angle=20.0), ("terrain", "20°", "10°")),
     ],
 )
 def test_what_cannot_be_stepped_is_told_with_the_limits_of_the_robot(terrain, says):
     walk = load_controller("walk", robot())
-    with pytest.raises(ConfigError, match=says):
+    with invalid(*says):
         walk.terrain = terrain
     walk.terrain = type(terrain)(**{**vars(terrain), "unseen": True})  # it does not know
     assert walk.gait.treads.surfaces.shape[0] == 0

@@ -14,9 +14,8 @@ from poise.baselines.walking.schedule import (
     follow_timetable,
     parse_commands,
 )
-from poise.configs.errors import ConfigError
 from poise.envs.physics.clock import Clock
-from tests.support.refused import refused
+from tests.support.refused import invalid, refused
 
 
 def test_one_command_or_a_list_of_them():
@@ -31,21 +30,20 @@ def test_one_command_or_a_list_of_them():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"ahead": float("nan")}, "reset: command: ahead: must be a finite number, not nan"),
+        ({"ahead": float("nan")}, ("ahead",)),
         (
             {"speed": 1.0},
-            r"speed: unknown field \(choices: ahead, left, turn, step_time, width, clearance, "
-            r"arm_swing, step_length, start\)",
+            ("speed", "ahead", "start"),
         ),
-        ({"start": -1.0}, "start: must be at least 0.0, not -1.0"),
-        ([{}, {}], "start: must increase from command to command"),
-        ("fast", "must be a mapping or a list of them, not 'fast'"),
-        ([3], "must be a mapping, not 3"),
-        ([{"start": float(k)} for k in range(MOST_COMMANDS + 1)], "at most 256 commands"),
+        ({"start": -1.0}, ("start", "0.0", "-1.0")),
+        ([{}, {}], ("start",)),
+        ("fast", (None, "'fast'")),
+        ([3], (None, "3")),
+        ([{"start": float(k)} for k in range(MOST_COMMANDS + 1)], (None, "256")),
     ],
 )
 def test_bad_commands(given, said):
-    with pytest.raises(ConfigError, match=said):
+    with invalid(*said):
         parse_commands(given)
 
 
@@ -55,9 +53,9 @@ def test_numbers_and_ranges_make_a_sampler():
     assert command_sampler(GaitCommand(0.1, 0.2, 0.3)) == CommandSampler(
         (0.1, 0.1), (0.2, 0.2), (0.3, 0.3)
     )
-    with pytest.raises(ConfigError, match="command: ahead: the range .* must not decrease"):
+    with invalid(None, source="command"):
         command_sampler({"ahead": [0.5, 0.2]})
-    with pytest.raises(ConfigError, match=r"must be a command or ranges of commands, not 0.5"):
+    with invalid("command", "0.5"):
         command_sampler(0.5)
     with refused("unknown field", "step_time", source="command"):
         command_sampler(GaitCommand(0.1, step_time=0.4))  # which a sampler does not draw

@@ -2,14 +2,12 @@
 
 from dataclasses import fields
 
-import pytest
-
-from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.balance.mdp.reward import RewardWeights
 from poise.envs.sensing.realism import Realism
+from tests.support.refused import invalid
 
 
 def test_packaged_configurations_are_found_by_name():
@@ -36,5 +34,5 @@ def test_what_came_later_is_written_only_where_it_is_used():
 
 def test_an_unknown_name_lists_the_packaged_ones():
     """The line names what there is."""
-    with pytest.raises(ConfigError, match=r"no such name: 'nowhere'.*proprioceptive"):
+    with invalid("envs", "'nowhere'", "proprioceptive"):
         env_config("nowhere")

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
 from poise.envs.balance.servos import ServoConfig, aim, drive, holding_torques, make_servos
 from poise.envs.physics.simulation import Simulation
+from tests.support.refused import invalid
 from tests.support.shared import generic_state, robot
 
 NAMES = [robot().joint_names[dof - 6] for dof in robot().motor_dofs]
@@ -85,11 +85,11 @@ def test_what_holds_the_posture(name):
 @pytest.mark.parametrize(
     ("config", "error"),
     [
-        ({"stiffness": {"tail": 1.0}}, r"servos.stiffness: no joint is called 'tail'.*left_knee"),
-        ({"damping": {"tail": 1.0}}, r"servos.damping: no joint is called 'tail'"),
-        ({"reach": {"*_knee": 1.0}}, r"servos.reach: none for abdomen_z.*left_elbow"),
+        ({"stiffness": {"tail": 1.0}}, ("servos.stiffness", "'tail'", "left_knee")),
+        ({"damping": {"tail": 1.0}}, ("servos.damping", "'tail'")),
+        ({"reach": {"*_knee": 1.0}}, ("servos.reach",)),
     ],
 )
 def test_joints_that_there_are_not(config, error):
-    with pytest.raises(ConfigError, match=error):
+    with invalid(*error):
         make_servos(robot(), ServoConfig(**config))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
 from poise.envs.compiled.calls import run
 from poise.envs.physics.arms import RATE, find_arms
 from poise.envs.robots.robot import load_robot
 from poise.envs.sensing.estimator import EstimatedState
+from tests.support.refused import invalid
 from tests.support.sensing import PLAIN, estimated, start
 from tests.support.shared import robot
 from tests.support.small_biped import write_biped
@@ -96,5 +96,5 @@ def test_a_robot_without_arms_is_refused(tmp_path):
 
     for level in (MOVED, {"body": {"hand": 0.05}}):
         field = "motors.arms" if level is MOVED else "body.hand"
-        with pytest.raises(ConfigError, match=rf"custom: {field}: .*has no arms.*shoulder_pitch"):
+        with invalid(field, "shoulder_pitch_left", source="custom"):
             TorqueBalanceEnv(biped, realism=level)

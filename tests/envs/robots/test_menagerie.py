@@ -16,6 +16,7 @@ from poise.envs.robots import menagerie
 from poise.envs.robots.description import RobotDescription, match_names
 from poise.envs.robots.menagerie import VARIABLES, WHEEL, find_model
 from poise.envs.robots.robot import load_robot
+from tests.support.refused import invalid
 from tests.support.small_biped import write_biped
 
 #: name → mass [kg] and number of joints, by the makers' model
@@ -70,7 +71,7 @@ def test_a_checkout_is_named_by_the_environment(
     text = f"own.yaml: source.menagerie: {variable}={checkout} has no unitree_g1/g1.xml"
     assert str(error.value) == f"{text} (choices: own_robot)"
     monkeypatch.setenv(variable, str(found))
-    with pytest.raises(ConfigError, match=f"{variable}=.* is no folder$"):
+    with invalid("source.menagerie", f"{variable}={found}"):
         find_model(FILE, "own.yaml")
 
 
@@ -78,12 +79,10 @@ def test_a_home_that_nobody_has(nothing: Path, monkeypatch: pytest.MonkeyPatch) 
     """Neither a checkout in it nor a machine without one is a traceback."""
     monkeypatch.delenv("HOME")
     monkeypatch.setattr("pwd.getpwuid", _nobody)
-    with pytest.raises(ConfigError, match="this machine has no own_robot/own.xml"):
+    with invalid("source.menagerie", "own_robot/own.xml"):
         find_model(FILE, "own.yaml")
     monkeypatch.setenv(VARIABLES[0], "~nosuchuser/menagerie")
-    with pytest.raises(
-        ConfigError, match=f"own.yaml: .*{VARIABLES[0]}=~nosuchuser/.* is no folder"
-    ):
+    with invalid("source.menagerie", f"{VARIABLES[0]}=~nosuchuser/", source="own.yaml"):
         find_model(FILE, "own.yaml")
 
 
@@ -94,7 +93,7 @@ def _nobody(number: int) -> None:
 @pytest.mark.parametrize("file", ["**/own.xml", "a\0/own.xml", "[/own.xml", "/own.xml"])
 def test_a_folder_of_a_strange_name_is_not_there(nothing: Path, file: str) -> None:
     """Whatever a description of anybody asks for."""
-    with pytest.raises(ConfigError, match="this machine has no .*own.xml"):
+    with invalid("source.menagerie", "own.xml"):
         find_model(file, "own.yaml")
 
 

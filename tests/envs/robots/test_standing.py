@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
+from tests.support.refused import invalid
 from tests.support.small_biped import BOX_FOOT, LEG, write_biped
 
 POSTURE = {"hip": -20.0, "knee": 40.0, "ankle": -20.0, "ankle_roll": 0.0}
@@ -154,7 +155,7 @@ def test_a_com_that_legs_cannot_bring_there(tmp_path: Path) -> None:
     """How far it is away, in millimetres."""
     weight = '<geom size="0.05" pos="0.9 0 0" mass="60"/>'
     path = write_biped(tmp_path, trunk=weight, posture={**posture(), "com": "middle"})
-    with pytest.raises(ConfigError, match=r"posture.com: the legs do not bring .* \d+ mm away"):
+    with invalid("posture.com"):
         load_robot(path)
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state_source import StateSource
 from poise.envs.sensing.estimator import EstimatedState
+from tests.support.refused import invalid
 from tests.support.sensing import PLAIN, drawn_of, estimated, start
 from tests.support.shared import robot
 
@@ -120,7 +120,7 @@ def test_an_episode_forgets_the_one_before(kind, predictor):
 def test_a_source_is_of_the_environments_simulation():
     """Another one's is refused."""
     env = TorqueBalanceEnv(robot(), pushes=None)
-    with pytest.raises(ConfigError, match="state_source: is about another simulation"):
+    with invalid("state_source"):
         env.state_source = StateSource(Simulation(robot()))
 
 

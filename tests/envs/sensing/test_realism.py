@@ -8,6 +8,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.sensing.estimator import check_latency
 from poise.envs.sensing.realism import Realism, load_realism, overlaid
+from tests.support.refused import invalid
 
 
 def test_levels_by_name_file_and_mapping(tmp_path):
@@ -53,7 +54,7 @@ def test_joined_levels_are_one(tmp_path):
     assert load_realism(f"late+{later}").latency.sense == 0.001
     assert load_realism(f"{later}+late").latency.sense == 0.02
     for wrong in ("field+arm", "+field", "field+"):
-        with pytest.raises(ConfigError, match="no such name"):
+        with invalid("realism"):
             load_realism(wrong)
 
 
@@ -70,18 +71,18 @@ def test_a_level_is_scaled():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("moon", "no such name: 'moon'.*field.*ideal.*lab"),
-        ({"latency": {"sense": [0.01, 0.0]}}, r"latency.*sense.*\[0.01, 0\] must not decrease"),
-        ({"latency": {"sens": 0.01}}, "latency.sens: .*sense"),
-        ({"wind": 3.0}, "wind: .*latency"),
-        ({"sensors": {"gyro_noise": -1.0}}, "sensors.gyro_noise"),
-        ({"sensors": {"gyro_noise": "much"}}, "sensors.gyro_noise"),
-        ({"base": "moon"}, "no such name: 'moon'"),
-        (7, "realism: must be the name of a level, a file or a mapping, not 7"),
+        ("moon", ("realism", "'moon'", "field", "ideal", "lab")),
+        ({"latency": {"sense": [0.01, 0.0]}}, ("latency", "0.01", "0")),
+        ({"latency": {"sens": 0.01}}, ("latency.sens", "sense")),
+        ({"wind": 3.0}, ("wind", "latency")),
+        ({"sensors": {"gyro_noise": -1.0}}, ("sensors.gyro_noise",)),
+        ({"sensors": {"gyro_noise": "much"}}, ("sensors.gyro_noise",)),
+        ({"base": "moon"}, ("realism", "'moon'")),
+        (7, ("realism", "7")),
     ],
 )
 def test_what_is_wrong_is_named(given, message):
-    with pytest.raises(ConfigError, match=message) as error:
+    with invalid(*message) as error:
         load_realism(given)
     assert "\n" not in str(error.value)
 

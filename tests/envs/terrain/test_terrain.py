@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
 from poise.configs.schema import to_dict
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.terrain.arrays import ground_height, surface_arrays
@@ -13,6 +12,7 @@ from poise.envs.terrain.slope import Slope
 from poise.envs.terrain.stairs import Stairs
 from poise.envs.terrain.stones import Stones
 from poise.envs.terrain.terrain import make_terrain, seeded
+from tests.support.refused import invalid
 
 
 def test_stairs_rise_by_one_step_at_every_edge():
@@ -88,13 +88,13 @@ def test_the_configuration_of_an_environment_takes_a_kind_or_a_mapping():
 @pytest.mark.parametrize(
     ("value", "says"),
     [
-        ("hills", r"terrain.kind: no such kind: 'hills' \(choices: .*stairs"),
-        ({"kind": "stairs", "rise": -0.1}, r"terrain.rise: must be above 0"),
-        ({"kind": "stairs", "height": 0.1}, r"terrain.height: unknown field \(choices: .*rise"),
-        (3, r"terrain: must be"),
+        ("hills", ("terrain.kind", "'hills'", "stairs")),
+        ({"kind": "stairs", "rise": -0.1}, ("terrain.rise", "above 0")),
+        ({"kind": "stairs", "height": 0.1}, ("terrain.height", "rise")),
+        (3, ("terrain", "3")),
     ],
 )
 def test_what_is_no_terrain_is_told_in_a_line(value, says):
     for take in (make_terrain, lambda terrain: env_config(None, terrain=terrain)):
-        with pytest.raises(ConfigError, match=says):
+        with invalid(*says):
             take(value)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.baselines.balance.references.footfalls import AHEAD, COLUMNS, FOOT, TIME, step_vector
+from poise.baselines.balance.references.footfalls import COLUMNS, Footfalls, step_vector
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.compiled.maths.vectors import rotation_vector
@@ -66,25 +66,27 @@ def compare(wanted: np.ndarray, found: np.ndarray, most_delay: float = 0.0) -> F
     """
     if not len(wanted):
         return Footsteps()
-    gaps = found[:, None, TIME] - wanted[:, TIME]
-    same = (found[:, None, FOOT] == wanted[:, FOOT]) & (np.abs(gaps) <= most_delay)
+    goals, steps = Footfalls(*wanted.T), Footfalls(*found.T)
+    gaps = steps.time[:, None] - goals.time
+    same = (steps.foot[:, None] == goals.foot) & (np.abs(gaps) <= most_delay)
     delays = sorted({0.0, *gaps[same].tolist()}, key=abs)
-    pairs, delay = max(((_pairs(wanted, found, d), d) for d in delays), key=lambda e: len(e[0]))
-    first, last = wanted[[0, -1], TIME] + [delay - AROUND, delay + AROUND]
-    number = int(np.sum((found[:, TIME] >= first) & (found[:, TIME] <= last)))
-    away = [np.linalg.norm((found[j] - wanted[i])[AHEAD:]) for i, j in pairs]
+    pairs, delay = max(((_pairs(goals, steps, d), d) for d in delays), key=lambda e: len(e[0]))
+    first, last = goals.time[[0, -1]] + [delay - AROUND, delay + AROUND]
+    number = int(np.sum((steps.time >= first) & (steps.time <= last)))
+    away = [np.hypot(steps.ahead[j] - goals.ahead[i], steps.left[j] - goals.left[i])
+            for i, j in pairs]  # fmt: skip
     kept = len(pairs) / max(len(wanted), number)
     return Footsteps(number / len(wanted), kept, delay, float(np.mean(away)) if away else np.nan)
 
 
-def _pairs(wanted: np.ndarray, found: np.ndarray, delay: float) -> list[tuple[int, int]]:
+def _pairs(goals: Footfalls, steps: Footfalls, delay: float) -> list[tuple[int, int]]:
     """Return indices of steps of the same foot within 0.1 s, each of one pair at most."""
-    pairs, left = [], list(range(len(found)))
-    for i, step in enumerate(wanted):
-        near = [j for j in left if found[j, FOOT] == step[FOOT]
-                and abs(found[j, TIME] - delay - step[TIME]) <= CLOSE + 1e-9]  # fmt: skip
+    pairs, left = [], list(range(len(steps.time)))
+    for i, time in enumerate(goals.time):
+        late = np.abs(steps.time - delay - time)
+        near = [j for j in left if steps.foot[j] == goals.foot[i] and late[j] <= CLOSE + 1e-9]
         if near:
-            best = min(near, key=lambda j: abs(found[j, TIME] - delay - step[TIME]))
+            best = min(near, key=late.__getitem__)
             pairs.append((i, best))
             left.remove(best)
     return pairs

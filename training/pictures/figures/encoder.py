@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import ConfigError, WriteError
 
 CRF = 20  # quality of H.264, lower is better: 18 is visually lossless
 FORMS: dict[str, dict[str, Any]] = {
@@ -31,7 +31,7 @@ def encoded(
 ) -> Iterator[Callable[[np.ndarray], None]]:
     """Run FFmpeg: yield a sink for frames; the file gets its name when the block succeeds.
 
-    Raises PoiseError if the file cannot be written.
+    Raises WriteError if the file cannot be written.
     """
     import imageio_ffmpeg
 
@@ -61,9 +61,9 @@ def encoded(
 
 @contextmanager
 def _reported(path: Path) -> Iterator[None]:
-    """Turn FFmpeg's errors into PoiseError."""
+    """Turn FFmpeg's errors into WriteError."""
     try:
         yield
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error).strip().splitlines()[0]
-        raise PoiseError(f"{path}: the video cannot be written ({reason})") from error
+        raise WriteError(path, reason) from error

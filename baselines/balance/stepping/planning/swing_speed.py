@@ -30,7 +30,6 @@ ROUNDS, STEP, CLOSE = 60, 0.05, 1e-6  # of the lift; most that a round turns a j
 FINE = 1e-3  # [m] to which heights are found
 NEAR = 1e-3  # [m] where only whether a place is reached counts
 STILL = 1e-6  # [m/s] of a foot that its joints do not move at all
-ROLL, PITCH = 3, 4  # rows of a sole's Jacobian, after those of its place
 UNBOUNDED = 3  # status of a linear program
 
 
@@ -124,12 +123,13 @@ def _foot_speed(robot: Robot, sole: int, clearance: float, share: float) -> Swin
     data, dofs = standing_data(robot), _leg_dofs(robot, sole)
     way = _lift(robot, data, sole, clearance, level=True)
     fastest = _joint_speeds(robot, data, dofs, share) / PEAK
-    rows = _jacobian(robot, data, sole, dofs)
+    place, turn = _jacobian(robot, data, sole, dofs)
     lift = np.inf
     if way is not None:
         moving = np.abs(way) > 0.0
         lift = clearance * np.min(fastest[moving] / np.abs(way[moving]))
-    return SwingSpeed(_fastest(rows, 0, fastest), _fastest(rows, 1, fastest), lift)
+    ahead, sideways = (_fastest(place, turn, axis, fastest) for axis in range(2))
+    return SwingSpeed(ahead, sideways, lift)
 
 
 def _joint_speeds(robot: Robot, data: mujoco.MjData, dofs: np.ndarray, share: float) -> np.ndarray:
@@ -162,33 +162,35 @@ def _lift(
         off = goal - sole_pose(data, robot.soles[sole])[0]
         if np.abs(off).max() < (CLOSE if level else NEAR):
             return data.qpos[dofs + 1] - start
-        place, rows = data.qpos[dofs + 1], _jacobian(robot, data, sole, dofs)
-        if level:
-            rows[ROLL:] *= 0.1 * robot.height_com  # a leg that cannot keep the sole level turns it
+        place, (rows, turn) = data.qpos[dofs + 1], _jacobian(robot, data, sole, dofs)
+        if level:  # a leg that cannot keep the sole level turns it
+            rows = np.concatenate([rows, turn * (0.1 * robot.height_com)])
             off = np.concatenate([off, np.zeros(3)])
         else:
-            rows = rows[:3] * ((low < place) & (place < high))  # what is at its end stays there
+            rows = rows * ((low < place) & (place < high))  # what is at its end stays there
         change = np.linalg.lstsq(rows, off, rcond=1e-4)[0]
         place = place + change * min(1.0, STEP / max(np.abs(change).max(), STEP))
         data.qpos[dofs + 1] = place if level else np.clip(place, low, high)
     return None
 
 
-def _fastest(rows: np.ndarray, axis: int, fastest: np.ndarray) -> float:
+def _fastest(place: np.ndarray, turn: np.ndarray, axis: int, fastest: np.ndarray) -> float:
     """The largest speed along an axis that joints no faster than `fastest` (n,) give the sole.
 
     A linear program. The sole stays level, or turns where the leg has no joint for that; it may
-    turn about the vertical.
+    turn about the vertical. `place` and `turn` are those of `_jacobian`.
     """
-    wanted, n = np.zeros(len(rows)), rows.shape[1]
-    wanted[axis] = -1.0
+    n, (roll, pitch, _) = place.shape[1], turn
     bounds = [(-v, v) if np.isfinite(v) else (None, None) for v in fastest.tolist()]
     speed = 0.0
-    for kept in ([0, 1, 2, ROLL, PITCH], [0, 1, 2, PITCH], [0, 1, 2, ROLL], [0, 1, 2]):
+    for level in ([roll, pitch], [pitch], [roll], []):
+        rows = np.array([*place, *level])
+        wanted = np.zeros(len(rows))
+        wanted[axis] = -1.0
         found = linprog(
             c=[*np.zeros(n), -1.0],
-            A_eq=np.column_stack([rows[kept], wanted[kept]]),
-            b_eq=np.zeros(len(kept)),
+            A_eq=np.column_stack([rows, wanted]),
+            b_eq=np.zeros(len(rows)),
             bounds=[*bounds, (0.0, None)],
         )
         speed = np.inf if found.status == UNBOUNDED else float(-found.fun)
@@ -197,10 +199,12 @@ def _fastest(rows: np.ndarray, axis: int, fastest: np.ndarray) -> float:
     return speed
 
 
-def _jacobian(robot: Robot, data: mujoco.MjData, sole: int, dofs: np.ndarray) -> np.ndarray:
-    """(6, n) of a sole's reference point, its place and then its turn; the robot faces along x."""
-    rows = np.zeros((6, robot.model.nv))
+def _jacobian(
+    robot: Robot, data: mujoco.MjData, sole: int, dofs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(3, n) of the place of a sole's reference point, and of its turn; the robot faces along x."""
+    place, turn = np.zeros((2, 3, robot.model.nv))
     foot = robot.soles[sole]
-    place, _ = sole_pose(data, foot)
-    mujoco.mj_jac(robot.model, data, rows[:3], rows[3:], place, foot.body_id)
-    return rows[:, dofs]
+    point, _ = sole_pose(data, foot)
+    mujoco.mj_jac(robot.model, data, place, turn, point, foot.body_id)
+    return place[:, dofs], turn[:, dofs]

@@ -6,12 +6,12 @@ import pytest
 from poise.baselines.balance.in_place.get_up import GRACE, GetUp, GetUpConfig, Key
 from poise.baselines.controller import Targets
 from poise.baselines.registry import controller_config, load_controller
-from poise.configs.errors import ConfigError
 from poise.envs.balance.fallen import fallen_posture
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.benchmarking.trials.rising import is_up
+from tests.support.refused import invalid
 
 ROBOT = load_robot()
 
@@ -107,6 +107,6 @@ def test_a_fall_while_standing_is_seen_and_a_joint_that_is_not_there() -> None:
     lying = Simulation(ROBOT).reset(fallen_posture(ROBOT, 600))
     controller.torques(lying, Targets.standing(ROBOT, lying))
     assert controller.stage == "lie"
-    with pytest.raises(ConfigError, match="no such joint"):
+    with invalid("tail"):
         GetUp(ROBOT, GetUpConfig(lie=(Key(joints={"tail": 3.0}),)))
     assert isinstance(controller_config("get-up"), GetUpConfig)

@@ -16,6 +16,7 @@ from poise.baselines.balance.references.robot_clip import (
 )
 from poise.configs.errors import ConfigError, PoiseError
 from tests.support.physics import robot_named
+from tests.support.refused import invalid
 
 
 @pytest.fixture
@@ -59,21 +60,21 @@ def test_a_lifted_foot_and_a_joint_out_of_range_are_refused(standing: RobotClip)
 @pytest.mark.parametrize(
     ("entry", "value", "text"),
     [
-        (0, 1e200, "qpos: must be finite and at most 10000"),
-        (9, np.nan, "qpos: must be finite and at most 10000"),
-        (5, 1e3, "qpos: the root's quaternion of frame 3 has the norm 1e"),
-        (3, 0.0, "qpos: the root's quaternion of frame 3 has the norm 0"),
+        (0, 1e200, ("qpos", "10000")),
+        (9, np.nan, ("qpos", "10000")),
+        (5, 1e3, ("qpos", "3", "1")),
+        (3, 0.0, ("qpos", "3", "0")),
     ],
 )
 def test_postures_that_are_none(
-    standing: RobotClip, tmp_path: Path, entry: int, value: float, text: str
+    standing: RobotClip, tmp_path: Path, entry: int, value: float, text: tuple[str, ...]
 ) -> None:
     """What a file holds beyond what a robot can be, or no rotation, is one line."""
     qpos = standing.qpos.copy()
     qpos[3, 3:7] = 1.0, 0.0, 0.0, 0.0
     qpos[3, entry] = value
     write_robot_clip(replace(standing, qpos=qpos), tmp_path / "clip.npz")
-    with pytest.raises(ConfigError, match=text):
+    with invalid(*text):
         read_robot_clip(tmp_path / "clip.npz")
 
 

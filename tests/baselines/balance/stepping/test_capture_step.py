@@ -20,6 +20,7 @@ from poise.configs.schema import to_dict
 from poise.envs.robots.menagerie import WHEEL
 from tests.support import planned
 from tests.support import stepping_reference as readable
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 QUIET_STEPS = 0
@@ -269,19 +270,19 @@ def test_a_step_at_the_first_tick_does_not_know_the_trial_before():
 @pytest.mark.parametrize(
     ("qp", "changes", "named"),
     [
-        ("qp", {"root": "soft"}, r"qp\.root: must be 'hard'"),
-        ("step_qp", {"root": "soft"}, r"step_qp\.root: must be 'hard'"),
-        ("step_qp", {"solver": "daqp"}, r"step_qp\.solver: must be 'active-set'"),
-        ("qp", {"solver": "daqp"}, r"qp\.solver: must be 'active-set'"),
-        ("qp", {"solver_options": {"max_iter": 9.0}}, r"qp\.solver_options: must be empty"),
-        ("step_qp", {"period": 0.002}, r"step_qp\.period: must be that of qp"),
+        ("qp", {"root": "soft"}, ("qp.root", "'hard'")),
+        ("step_qp", {"root": "soft"}, ("step_qp.root", "'hard'")),
+        ("step_qp", {"solver": "daqp"}, ("step_qp.solver", "'active-set'")),
+        ("qp", {"solver": "daqp"}, ("qp.solver", "'active-set'")),
+        ("qp", {"solver_options": {"max_iter": 9.0}}, ("qp.solver_options",)),
+        ("step_qp", {"period": 0.002}, ("step_qp.period",)),
     ],
 )
 def test_qps_that_cannot_step_are_refused(qp, changes, named):
     """A wrench on the root has no meaning in a step; the contact QPs have one solver and period."""
     config = controller_config("capture-step")
     config = replace(config, **{qp: replace(getattr(config, qp), **changes)})
-    with pytest.raises(ConfigError, match=named):
+    with invalid(*named):
         CaptureStep(robot(), config)
 
 

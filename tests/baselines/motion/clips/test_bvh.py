@@ -15,6 +15,7 @@ from poise.baselines.motion.clips.rotations import angle_between
 from poise.configs.errors import ConfigError, PoiseError
 from tests.support.captured import captured
 from tests.support.motion_files import FRAMES, mutated, small_bvh
+from tests.support.refused import invalid
 
 MUTATIONS = 150
 
@@ -147,29 +148,31 @@ def test_unknown_legs_are_named_or_need_unit_and_axes(small: Path) -> None:
     """Where neither names nor structure tell: here one leg is longer."""
     text = small.read_text().replace("UpLeg", "Tentacle").replace("-0.4 0", "-0.3 0", 1)
     small.write_text(text)
-    with pytest.raises(ConfigError, match="no joint is called as 'hip_left' is, .*hip_left=JOINT"):
+    with invalid("joints", "'hip_left'"):
         read_bvh(small)
     assert len(read_bvh(small, "m", "y", "z").clip) == FRAMES
     joints = {"hip_left": "LeftTentacle", "hip_right": "RightTentacle"}
     named, axes = read_bvh(small, joints=joints)
     assert axes.names == ("y", "z") and axes.unit == 1.0
     assert named.skeleton.names[named.skeleton.roles["hip_left"]] == "LeftTentacle"
-    with pytest.raises(ConfigError, match="joints: no such role: 'wing' .choices: hip_left"):
+    with invalid("joints", "'wing'", "hip_left"):
         read_bvh(small, joints={"wing": "LeftLeg"})
-    with pytest.raises(ConfigError, match="joints.hip_left: no joint is called 'x'"):
+    with invalid("joints.hip_left", "'x'"):
         read_bvh(small, joints={"hip_left": "x"})
 
 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("mile",), "unit: no such unit: 'mile' .choices: m, "),
-        (("m", "w"), "up: no such axis: 'w' .choices: x, "),
-        (("m", "y", "-y"), "are on one line"),
+        (("mile",), ("unit", "'mile'", "m")),
+        (("m", "w"), ("up", "'w'", "x")),
+        (("m", "y", "-y"), ("forward",)),
     ],
 )
-def test_wrong_units_and_axes(small: Path, arguments: tuple[str, ...], text: str) -> None:
-    with pytest.raises(ConfigError, match=text):
+def test_wrong_units_and_axes(
+    small: Path, arguments: tuple[str, ...], text: tuple[str, ...]
+) -> None:
+    with invalid(*text):
         read_bvh(small, *arguments)
 
 

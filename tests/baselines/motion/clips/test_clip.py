@@ -8,7 +8,7 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.clips.rotations import angle_between, slerp
 from poise.configs.errors import ConfigError
-from tests.support.refused import refused
+from tests.support.refused import invalid, refused
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def test_turned_and_moved_as_a_whole(walk: Clip) -> None:
     assert abs(faced.facing()[0]) < 1e-12
     assert faced.root[0, :2] == pytest.approx([0, 0], abs=1e-12)
     assert faced.root[-1, 0] > 0.45  # who walks, walks ahead
-    with pytest.raises(ConfigError, match="turn: must be finite, not nan"):
+    with invalid("turn"):
         walk.turned(np.nan)
 
 
@@ -43,9 +43,9 @@ def test_cut_speed_and_reverse(walk: Clip) -> None:
     assert fast.dt == walk.dt and fast.duration == pytest.approx(walk.duration / 2, abs=walk.dt)
     assert np.abs(fast.root[7] - walk.root[14]).max() < 1e-12
     assert np.all(walk.reversed().places() == walk.places()[::-1])
-    with pytest.raises(ConfigError, match="cut: must be two times within 0 and 7.9"):
+    with invalid("cut", "0", "7.9"):
         walk.cut(1.0, 9.0)
-    with pytest.raises(ConfigError, match="cut: must be two times within 0 and 7.9"):
+    with invalid("cut", "0", "7.9"):
         walk.cut(np.nan, np.inf)
     with refused("range", "speed", above=0):
         walk.at_speed(0.0)

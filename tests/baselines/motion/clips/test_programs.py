@@ -9,6 +9,7 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.configs.errors import ConfigError
 from tests.support.conventions import BODIES, CONVENTIONS, body_bvh, names_of
+from tests.support.refused import invalid
 
 ARMS = [f"{role}_{side}" for side in ("left", "right") for role in ("shoulder", "elbow", "wrist")]
 LEGS = [f"{role}_{side}" for side in ("left", "right") for role in ("hip", "knee", "ankle", "toe")]
@@ -64,7 +65,7 @@ def test_positions_of_rigid_bones_are_the_same_clip(tmp_path: Path, added: bool)
 
 
 def test_bones_that_stretch_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="'Neck' moves by .* on its parent.*rotations alone"):
+    with invalid("joints", "'Neck'"):
         read(tmp_path, with_positions(body_bvh(PLAIN), moved=40.0))
 
 

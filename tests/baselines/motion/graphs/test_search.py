@@ -18,7 +18,7 @@ from poise.baselines.motion.graphs.paths import PathTask
 from poise.baselines.motion.graphs.search import best_paths
 from poise.configs.errors import ConfigError
 from tests.support.motion_graphs import check_search
-from tests.support.refused import refused
+from tests.support.refused import invalid, refused
 
 GRAPHS = 40  # python -m tests.performance.motion_search walks 1,000
 
@@ -113,8 +113,7 @@ def test_what_cannot_be_made_is_gone_round_and_asked_about_once() -> None:
     (path,) = best_paths(graph, PathTask(("a", "b")), check=check)
     assert [step.clip for step in path.steps] == ["a", "d", "b"]
     assert len(asked) == len(set(asked)) == 5
-    with pytest.raises(ConfigError, match=r"no way from 'a' to 'b' \(reachable: a, c, d; nearest "
-                       r"to it: never\)"):  # fmt: skip
+    with invalid(None, "'a'", "'b'"):
         best_paths(graph, PathTask(("a", "b")), check=lambda t: "never" if t.after == "b" else "")
 
 
@@ -127,18 +126,18 @@ def test_no_way_says_how_far_it_goes_and_what_is_nearest() -> None:
     assert str(caught.value) == (
         "no way from 'a' to 'jump' (reachable: a, b; nearest to it: K = 41 > 20)"
     )
-    with pytest.raises(ConfigError, match="no way from the start to 'a'"):
+    with invalid(None, "'a'"):
         best_paths(graph, PathTask(("a",), start={("b", 1.0): 0.0}))
-    with pytest.raises(ConfigError, match="no way from 'a' to the goal"):
+    with invalid(None, "'a'"):
         best_paths(graph, PathTask(("a",), goal={("x", 1.0): 0.0}))
 
 
 def test_wrong_tasks() -> None:
     graph = chain(("a", "b"))
-    with pytest.raises(ConfigError, match=r"no clip is called 'wawe' \(choices: a, b\)"):
+    with invalid("actions", "'wawe'", "a", "b"):
         best_paths(graph, PathTask(("a", "wawe")))
     with refused("range", "k", least=1, value="0"):
         best_paths(graph, PathTask(("a",)), 0)
-    with pytest.raises(ConfigError, match="a path needs an action"):
+    with invalid("actions"):
         best_paths(graph, PathTask(()))
     assert np.isfinite(best_paths(graph, PathTask(("b",)))[0].cost)

@@ -17,6 +17,7 @@ from poise.baselines.policy_files.networks import load_network
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
 from tests.support.policies import within
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 PERIOD, COUNT = 0.02, 11
@@ -114,7 +115,7 @@ def test_a_clip_of_our_own(tmp_path: Path) -> None:
     clip = RobotClip(About("compact", BODY.fingerprint, "own"), 0.02, qpos)
     write_robot_clip(clip, tmp_path / "own.npz")
     check(read_clip(tmp_path / "own.npz", BODY, NAMES[::-1], PERIOD))
-    with pytest.raises(ConfigError, match="is a motion of the robot 'compact'"):
+    with invalid("motion", "'compact'"):
         read_clip(tmp_path / "own.npz", robot(), list(robot().joint_names), PERIOD)
 
 
@@ -191,7 +192,7 @@ def test_a_network_without_a_clip(tmp_path: Path) -> None:
     """The field, and what to do."""
     path = within(tmp_path / "p.onnx", 4, joint_pos=moving(50.0)[2])
     network = load_network(path, PolicyFileConfig(observations=CONFIG))
-    with pytest.raises(ConfigError, match="motion.clip: the network holds no clip"):
+    with invalid("motion.clip"):
         network_clip(network, BODY, NAMES, "", PERIOD, "own.yaml")
 
 

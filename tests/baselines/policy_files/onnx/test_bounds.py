@@ -17,6 +17,7 @@ from poise.baselines.policy_files.onnx.files import digest
 from poise.baselines.policy_files.onnx.tensors import DEPTH, external_files
 from poise.configs.errors import ConfigError, PoiseError
 from tests.support.policies import helper, linear, onnx, write_onnx, write_recurrent
+from tests.support.refused import invalid
 
 FLOAT, BOOL, INT = onnx.TensorProto.FLOAT, onnx.TensorProto.BOOL, onnx.TensorProto.INT64
 info = helper.make_tensor_value_info
@@ -186,7 +187,7 @@ def test_data_elsewhere_is_refused(name: str, tmp_path: Path) -> None:
         if entry.key == "location":
             entry.value = name
     path.write_bytes(model.SerializeToString())
-    with pytest.raises(ConfigError, match="policy: policy.onnx has data in .*, not beside it"):
+    with invalid("policy", "policy.onnx"):
         digest(path, path)
 
 
@@ -196,7 +197,7 @@ def test_data_elsewhere_is_refused(name: str, tmp_path: Path) -> None:
 ], ids=["number", "cut off", "group", "no value", "text", "parts"])  # fmt: skip
 def test_what_is_no_onnx_file_is_told(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "policy.onnx").write_bytes(content)
-    with pytest.raises(ConfigError, match=r"policy.onnx: is no ONNX file \("):
+    with invalid(None, source="policy.onnx"):
         digest(tmp_path / "policy.onnx", "policy")
 
 

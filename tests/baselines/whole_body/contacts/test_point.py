@@ -17,11 +17,11 @@ from poise.baselines.whole_body.contacts.contact import (
 from poise.baselines.whole_body.contacts.point import PointContact, force_cone
 from poise.baselines.whole_body.formulation import build, torques_of, unknowns
 from poise.baselines.whole_body.parts.part import bind_parts
-from poise.configs.errors import ConfigError
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.simulation import Simulation
 from tests.support import contact_sets
 from tests.support.physics import random_state, robot_named
+from tests.support.refused import invalid
 from tests.support.wall import contact_described, reaching, robot_at_a_wall, wall_force
 
 NORMAL = np.array([-1.0, 0.0, 0.0])
@@ -186,16 +186,16 @@ def _cop_of_feet(qp, state):
 @pytest.mark.parametrize(
     ("contact", "message"),
     [
-        ({"kind": "rope"}, r"contacts.c.kind: no such kind: 'rope' \(choices: point\)"),
-        ({"kind": "point", "body": "torso"}, "contacts.c.normal: this field is missing"),
-        (contact_described(body="nose"), "contacts.c.body: .*no body 'nose' .*right_lower_arm"),
-        (contact_described(normal=[0.0, 0.0, 0.0]), "contacts.c: normal: must not be zero"),
-        (contact_described(friction=0.0), "contacts.c.friction: .*above 0"),
+        ({"kind": "rope"}, ("contacts.c.kind", "'rope'", "point")),
+        ({"kind": "point", "body": "torso"}, ("contacts.c.normal",)),
+        (contact_described(body="nose"), ("contacts.c.body", "'nose'", "right_lower_arm")),
+        (contact_described(normal=[0.0, 0.0, 0.0]), ("contacts.c",)),
+        (contact_described(friction=0.0), ("contacts.c.friction", "0")),
     ],
 )
 def test_a_contact_that_cannot_be_is_refused(contact, message):
     """Naming the field and the choices."""
-    with pytest.raises(ConfigError, match=message):
+    with invalid(*message):
         load_controller({"base": "momentum-qp", "contacts": {"c": contact}}, robot_at_a_wall())
 
 

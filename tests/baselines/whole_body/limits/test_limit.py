@@ -13,13 +13,13 @@ from poise.baselines.whole_body.formulation import build, torques_of, unknowns
 from poise.baselines.whole_body.limits.joint_speed import JointSpeed
 from poise.baselines.whole_body.limits.limit import Limit
 from poise.baselines.whole_body.limits.torque import Torque
-from poise.configs.errors import ConfigError
 from poise.configs.schema import build as build_config
 from poise.configs.schema import to_dict
 from poise.envs.physics.simulation import Simulation
 from tests.support import contact_sets
 from tests.support.limits import EXAMPLES, described
 from tests.support.physics import recovery, robot_named
+from tests.support.refused import invalid
 
 
 def config(*names, **changes):
@@ -175,15 +175,15 @@ def test_limits_are_read_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("limit", "message"),
     [
-        ({"kind": "power"}, r"limits.c.kind: no such kind: 'power' \(choices: joint-speed, torque"),
-        ({"kind": "joint-speed"}, "limits.c.largest: this field is missing"),
-        ({"kind": "torque", "joints": ["tail*"]}, r"limits.c.joints: .*'tail\*'.*left_elbow"),
-        ({"kind": "torque", "share": 2.0}, "limits.c.share: .*at most 1"),
+        ({"kind": "power"}, ("limits.c.kind", "'power'", "joint-speed", "torque")),
+        ({"kind": "joint-speed"}, ("limits.c.largest",)),
+        ({"kind": "torque", "joints": ["tail*"]}, ("limits.c.joints", "'tail*'", "left_elbow")),
+        ({"kind": "torque", "share": 2.0}, ("limits.c.share", "1")),
     ],
 )
 def test_a_limit_that_cannot_be_is_refused(limit, message):
     """Naming the field and the choices."""
-    with pytest.raises(ConfigError, match=message):
+    with invalid(*message):
         load_controller({"base": "momentum-qp", "limits": {"c": limit}}, robot_named("humanoid"))
 
 

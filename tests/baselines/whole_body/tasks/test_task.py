@@ -17,6 +17,7 @@ from poise.configs.schema import build as build_config
 from poise.configs.schema import to_dict
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import random_state, recovery, robot_named
+from tests.support.refused import invalid
 from tests.support.tasks import EXAMPLES, described, filled, given
 
 
@@ -145,18 +146,18 @@ def test_tasks_are_read_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("task", "message"),
     [
-        ({"body": "torso"}, r"tasks.t.kind: this field is missing \(choices: .*orientation"),
-        ({"kind": "dance"}, r"tasks.t.kind: no such kind: 'dance' \(choices: .*orientation"),
-        ({"kind": ["a"]}, r"tasks.t.kind: no such kind: \['a'\]"),
-        ("orientation", "tasks.t: must be a mapping of fields"),
-        ({"kind": "orientation"}, "tasks.t.body: this field is missing"),
-        ({"kind": "orientation", "body": "nose"}, r"tasks.t.body: .*no body 'nose' .*torso"),
-        ({"kind": "orientation", "body": "torso", "weight": -1.0}, "tasks.t.weight: .*at least"),
+        ({"body": "torso"}, ("tasks.t.kind", "orientation")),
+        ({"kind": "dance"}, ("tasks.t.kind", "'dance'", "orientation")),
+        ({"kind": ["a"]}, ("tasks.t.kind", "'a'")),
+        ("orientation", ("tasks.t",)),
+        ({"kind": "orientation"}, ("tasks.t.body",)),
+        ({"kind": "orientation", "body": "nose"}, ("tasks.t.body", "'nose'", "torso")),
+        ({"kind": "orientation", "body": "torso", "weight": -1.0}, ("tasks.t.weight",)),
     ],
 )
 def test_a_task_that_cannot_be_is_refused(task, message):
     """Naming the field and the choices."""
-    with pytest.raises(ConfigError, match=message):
+    with invalid(*message):
         load_controller({"base": "momentum-qp", "tasks": {"t": task}}, robot_named("humanoid"))
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
 from poise.envs.balance.mdp.observation import (
     Terms,
     View,
@@ -16,6 +15,7 @@ from poise.envs.balance.mdp.observation import (
 from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.compiled.calls import Program, run
+from tests.support.refused import invalid
 from tests.support.shared import generic_state, robot
 
 
@@ -274,20 +274,21 @@ def test_measurements_are_as_noisy_as_sensors():
 @pytest.mark.parametrize(
     ("chosen", "error"),
     [
-        ({"privileged": ["measured_rate"]}, r"privileged: unknown term 'measured_rate'.*root_rate"),
-        ({"privileged": ["mas"]}, r"observation.privileged: unknown term 'mas'.*friction"),
-        ({"privileged": ["com", "com"]}, r"observation: 'com' comes twice"),
-        ({"history": 0}, r"observation.history: must be at least 1"),
-        ({"terms": ["com", "comm"]}, r"observation.terms: unknown term 'comm'.*com_height"),
-        ({"extra": ["push me"]}, r"observation.extra: unknown term 'push me'"),
-        ({"extra": ["com"]}, r"observation: 'com' comes twice"),
-        ({"terms": []}, r"observation.terms: needs at least one term"),
-        ({"terms": "com"}, r"observation.terms: must be a list"),
+        ({"privileged": ["measured_rate"]}, ("privileged", "'measured_rate'", "root_rate")),
+        ({"privileged": ["mas"]}, ("privileged", "'mas'", "friction")),
+        ({"privileged": ["com", "com"]}, (None, "'com'", "twice")),
+        ({"history": 0}, ("history", "at least 1")),
+        ({"terms": ["com", "comm"]}, ("terms", "'comm'", "com_height")),
+        ({"extra": ["push me"]}, ("extra", "'push me'")),
+        ({"extra": ["com"]}, (None, "'com'", "twice")),
+        ({"terms": []}, ("terms", "at least one")),
+        ({"terms": "com"}, ("terms", "a list", "'com'")),
     ],
 )
 def test_wrong_terms_are_refused(chosen, error):
     """Unknown, twice or none; the line names the choices."""
-    with pytest.raises(ConfigError, match=error):
+    field, *values = error
+    with invalid("observation" if field is None else f"observation.{field}", *values):
         TorqueBalanceEnv(robot(), observation=chosen)
 
 

@@ -12,6 +12,7 @@ from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.vector.batch import replicate
 from poise.envs.balance.vector.vector_env import BalanceVectorEnv
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 RESIDUAL, TORQUE = "poise/ResidualBalance-v0", "poise/TorqueBalance-v0"
@@ -245,9 +246,9 @@ def test_wrong_actions_move_nothing():
         bad[1, 2] = value
         with pytest.raises(ConfigError, match=r"must lie in \[-1, 1\], but cop_x is (nan|1.5)"):
             env.step(bad)
-    with pytest.raises(ConfigError, match=r"has shape \(2, 4\), expected \(3, 4\)"):
+    with invalid("action", "2", "4", "3"):
         env.step(good[:2])
-    with pytest.raises(ConfigError, match="must be numbers"):
+    with invalid("action"):
         env.step("left")
     assert env.get_attr("steps") == (0, 0, 0)
     assert np.array_equal(env.batch.episodes["observation"], before)
@@ -311,7 +312,7 @@ def test_a_controller_object_serves_one_environment():
         def torques(self, state, targets):
             return np.zeros(21)
 
-    with pytest.raises(ConfigError, match="controller.*give each its own"):
+    with invalid("controller"):
         native(controller=Still())
     env = native(n=1, threads=1, controller=Still())
     env.reset(seed=0)

@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.compiled.callbacks import Callback
 from poise.envs.physics.engines.config import load_physics
 from poise.envs.physics.engines.engine import Engine
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 PUSH = {"impulse": 8.0, "direction": 200.0, "start": 0.05}
@@ -91,5 +91,5 @@ def test_an_engine_that_is_not_installed_names_the_extra(monkeypatch):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "pydrake" else find(name)
     )
-    with pytest.raises(ConfigError, match="drake.yaml: engine: drake is not installed: pip"):
+    with invalid("engine", source="drake.yaml"):
         load_physics("drake")

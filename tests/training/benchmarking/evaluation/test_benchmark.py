@@ -35,6 +35,7 @@ from poise.training.benchmarking.trials.variants import AgentVariants
 from poise.training.cli.entry import main
 from poise.training.learning.policy import load_policy
 from tests.support.benchmarks_small import TRIALS, InProcessExecutor, play_in_process, write_small
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 BOTH = ("momentum-qp", "zero")
@@ -264,21 +265,21 @@ def test_a_controller_that_cannot_be_loaded_is_no_trial(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"controllers": ["zero", "zero"]}, "'zero' is given twice"),
-        ({"controllers": ["pid"]}, "no such controller: 'pid'"),
-        ({"suite": "tiny"}, "suites: no such name: 'tiny'.*quick"),
-        ({"seed": -1}, "seed: must be at least 0"),
-        ({"workers": 0}, "workers: must be at least 1"),
-        ({"trials": 0}, "trials: must be at least 1"),
-        ({"backend": "dask"}, "no such backend: 'dask'.*ray"),
+        ({"controllers": ["zero", "zero"]}, ("controllers", "'zero'")),
+        ({"controllers": ["pid"]}, ("controller", "'pid'")),
+        ({"suite": "tiny"}, ("suites", "'tiny'", "quick")),
+        ({"seed": -1}, ("seed", "0")),
+        ({"workers": 0}, ("workers", "1")),
+        ({"trials": 0}, ("trials", "1")),
+        ({"backend": "dask"}, ("backend", "'dask'", "ray")),
     ],
 )
 def test_bad_input_is_refused_and_nothing_is_written(
-    tmp_path: Path, arguments: dict[str, Any], message: str
+    tmp_path: Path, arguments: dict[str, Any], message: tuple[str, ...]
 ) -> None:
     """One clear error, before the folder is made."""
     given = {"controllers": ["zero"], "suite": "quick", "out": tmp_path / "out", **arguments}
-    with pytest.raises(ConfigError, match=message):
+    with invalid(*message):
         benchmark(**given)
     assert not (tmp_path / "out").exists()
 

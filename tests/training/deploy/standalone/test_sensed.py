@@ -10,13 +10,14 @@ import pytest
 
 import poise
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import PoiseError
 from poise.envs.sensing.config import EstimatorConfig
 from poise.envs.sensing.measurement import RING
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.deploy.standalone.readings import Measurement, Readings
 from poise.training.deploy.standalone.sensed import MotorCommand, SensedController, typical
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 PUSH = {"impulse": 20.0, "direction": 40.0, "duration": 0.1, "start": 0.06, "body": "torso"}
@@ -136,37 +137,37 @@ def test_at_rest_it_holds_the_robot() -> None:
 @pytest.mark.parametrize(
     ("field", "value", "said"),
     [
-        ("attitude", [2.0, 0.0, 0.0, 0.0], "quaternion of length 1"),
-        ("acceleration", [0.0, 0.0, np.nan], "3 finite numbers"),
-        ("contacts", [True], "2 finite numbers"),
-        ("joint_positions", {"knee": 0.0}, "lacks"),
-        ("ground_wrench", None, "6 finite numbers"),
+        ("attitude", [2.0, 0.0, 0.0, 0.0], "length 1"),
+        ("acceleration", [0.0, 0.0, np.nan], "3 finite"),
+        ("contacts", [True], "2 finite"),
+        ("joint_positions", {"knee": 0.0}, "abdomen_z"),
+        ("ground_wrench", None, "6 finite"),
     ],
 )
 def test_a_wrong_measurement_is_named(field: str, value: object, said: str) -> None:
     controller = poise.load_standalone("momentum-qp", robot(), realism="lab")
-    with pytest.raises(ConfigError, match=f"measurement: {field}: .*{said}"):
+    with invalid(field, said, source="measurement"):
         controller.reset(START, standing(**{field: value}))
 
 
 def test_what_cannot_run_on_a_robot_is_refused() -> None:
     load = partial(poise.load_standalone, "momentum-qp", robot())
-    with pytest.raises(ConfigError, match="ideal"):
+    with invalid("realism"):
         load(realism="ideal")
-    with pytest.raises(ConfigError, match="velocity_nois"):
+    with invalid("sensors.velocity_nois"):
         load(realism={"sensors": {"velocity_nois": 0.1}})
     agent = load_agent("momentum-qp", robot())
     agent.env.estimator = EstimatorConfig("exact")
-    with pytest.raises(ConfigError, match="no sensor measures.*odometry"):
+    with invalid("estimator.kind", "odometry"):
         SensedController(agent, load_realism("lab"))
     controller = load(realism="lab")
     with pytest.raises(PoiseError, match="before reset"):
         controller.command()
-    with pytest.raises(ConfigError, match="at least one"):
+    with invalid("measured"):
         controller.reset(START, [])
     controller.reset(START, standing())
     controller.command()
-    with pytest.raises(ConfigError, match=f"must be {controller.measurements} measurements, not 1"):
+    with invalid("measured", str(controller.measurements), "not 1"):
         controller.command(standing())
 
 
@@ -192,5 +193,5 @@ def test_targets_give_the_same_torque(servo: bool) -> None:
 
 def test_targets_need_a_stiffness() -> None:
     command = MotorCommand(*np.zeros((4, 2)))
-    with pytest.raises(ConfigError, match=r"stiffness: must be above 0"):
+    with invalid("stiffness", "0"):
         command.targets(np.zeros(2), np.zeros(2), np.zeros(2), np.ones(2))

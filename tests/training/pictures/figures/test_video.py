@@ -7,7 +7,7 @@ import PIL.Image
 import pytest
 from matplotlib.image import imread
 
-from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.errors import ConfigError, PoiseError, WriteError
 from poise.training.pictures.figures.video import (
     WEBP_RATE,
     WEBP_SIZE,
@@ -101,8 +101,9 @@ def test_failure_keeps_the_old_file(can_render, env, tmp_path):
 def test_place_that_cannot_be_written(can_render, env, tmp_path):
     """One clear error that names the file."""
     (tmp_path / "file").write_text("")
-    with pytest.raises(PoiseError, match=r"a\.mp4.*cannot be written"):
+    with pytest.raises(WriteError) as caught:
         record(env, still, tmp_path / "file" / "a.mp4", size=(32, 32))
+    assert caught.value.path.endswith("a.mp4")
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from poise.training.pictures.sessions.live import KEPT, Live
 from poise.training.pictures.sessions.loading import read_mapping
 from poise.training.pictures.sessions.session import Session, load_session
 from poise.training.pictures.sessions.spec import SessionSpec
+from tests.support.refused import invalid
 from tests.support.shared import robot
 
 NAMES = ["momentum-qp", "feedback-step"]
@@ -114,15 +115,15 @@ def test_after_a_fall_the_motors_are_off(session: Session) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"body": "tail"}, "body: no body 'tail'"),
-        ({"impulse": -1.0}, "impulse: must be"),
-        ({"impulse": float("nan")}, "impulse: must be"),
-        ({"duration": 0.0}, "duration: must be"),
+        ({"body": "tail"}, ("body", "'tail'")),
+        ({"impulse": -1.0}, ("impulse",)),
+        ({"impulse": float("nan")}, ("impulse",)),
+        ({"duration": 0.0}, ("duration",)),
     ],
 )
-def test_a_wrong_push_is_refused(session: Session, change: dict, message: str) -> None:
+def test_a_wrong_push_is_refused(session: Session, change: dict, message: tuple[str, ...]) -> None:
     session.reset()
-    with pytest.raises(ConfigError, match=message):
+    with invalid(*message):
         session.push(**{**SMALL, **change})
     assert session.pushes == ()
 
