@@ -70,8 +70,10 @@ class Calibration:
 
     def arrays(self) -> "CalibrationArrays":
         """Return the same for compiled code."""
-        knots = (np.array(self._both(name), float).reshape(-1, 2) for name in AXES)
-        return CalibrationArrays(*knots, *self.start, self.still)
+        ahead, left, turn, in_place, aside = (
+            np.array(self._both(name), float).reshape(-1, 2) for name in AXES
+        )
+        return CalibrationArrays(ahead, left, turn, in_place, aside, *self.start, self.still)
 
 
 @dataclass(frozen=True, eq=False)

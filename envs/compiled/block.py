@@ -60,7 +60,7 @@ class Block:
             if (dtype := mutable_dtype(kind)) is not None:
                 own[name] = MutableMember(name, dtype)
                 setattr(cls, name, own[name])
-        numbers = {name: InitVar(each.dtype) for name, each in own.items()}
+        numbers: dict[str, Any] = {name: InitVar(each.dtype) for name, each in own.items()}
         cls.__annotations__ = {**get_annotations(cls), **numbers}
         cls.mutable = {**cls.mutable, **own}
 
