@@ -141,5 +141,7 @@ def observed_turn(
 ) -> float:
     """The same of the turn rate."""
     in_place = command[0] == 0.0 and command[1] == 0.0
-    seen = through(c.in_place if in_place and c.in_place.shape[0] > 0 else c.turn, command[2] + shift)
+    seen = through(
+        c.in_place if in_place and c.in_place.shape[0] > 0 else c.turn, command[2] + shift
+    )
     return begun(seen, command[2], c.start_turn) if still and in_place else seen

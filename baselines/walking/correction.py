@@ -1,7 +1,8 @@
-"""A walk that is led to its commanded velocity by leg odometry.
+"""The velocity of a walk, corrected by leg odometry.
 
-The foot that is lower bears the robot and rests, so that joints, gyro and attitude tell the velocity
-of the CoM: v = ċ − ṡ, s the point of that sole. Neither term is measured alone, their difference is.
+The foot that is lower bears the robot and rests, so that joints, gyro and attitude give the
+velocity of the CoM: v = ċ − ṡ, s the point of that sole. Neither term is measured alone, their
+difference is.
 What a `Calibration` misses of a robot, its loads and its delays is then integrated,
 
     δ ← clip(δ + k T (c − v̄), −most, most),

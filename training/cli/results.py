@@ -52,8 +52,8 @@ def leaderboard(
 
     Args:
         results: a summary.json of poise benchmark, or of poise evaluate with a suite of walks such
-            as walkers, the folder that holds it, or a folder of such files. Controllers of later results are added, or
-            take the place of earlier ones of their name.
+            as walkers, the folder that holds it, or a folder of such files. Controllers of later
+            results are added, or take the place of earlier ones of their name.
         page: the Markdown file to write; docs/leaderboard.md, docs/walking-leaderboard.md for
             walks, or docs/scenarios.md for scenarios, if not given.
     """

@@ -1,4 +1,4 @@
-"""baselines/walking/correction.py: the velocity by leg odometry, and the command that it corrects."""
+"""baselines/walking/correction.py: velocity by leg odometry, and the command that it corrects."""
 
 import numpy as np
 import pytest
