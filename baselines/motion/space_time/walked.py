@@ -25,6 +25,7 @@ FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, t
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 STRIDE = 0.6  # [s] without a foot on the ground: longer is no run
 LONGEST = 0.72  # [h] of a step: further, robots fall
+SHARE = 0.7  # of a clip's way times its tempo, from which its own steps are taken
 OWN, EARLY = 0.66, 0.02  # [h] of a step that lasts as the clip's; [s] by which soles touch early
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
@@ -107,7 +108,7 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     each = _steps(lands, period, walk.duration)
     rows = np.array([[start, *(rate[_frames(start, end)].mean() for rate in (ahead, left, turn)),
                       own] for start, end, own in each])  # fmt: skip
-    if own := _own_steps(rows, robot, least):
+    if own := _own_steps(rows, robot, max(least, SHARE)):
         return own
     commands = faster(rows, tempo)
     if learned:
@@ -155,7 +156,7 @@ def _own_steps(rows: np.ndarray, robot: Robot, least: float) -> Walked | None:
                 np.sqrt(BANK * robot.units.gravity / max(way * bend, 1e-9)),
                 float(times.min()) * omega / (QUICKEST + BOTH))  # fmt: skip
     slowest = (SLOWEST + BOTH) / omega
-    if way * tempo < max(least, 1e-9) or (times / tempo).max() > slowest:
+    if way * tempo < least or (times / tempo).max() > slowest:
         return None
     commands = faster(rows * [1.0, way, way, 1.0, 1.0], tempo)
     commands[:, 4] -= BOTH / omega - EARLY
