@@ -61,7 +61,7 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription) -> None:
 
 
 def check_root(model: mujoco.MjModel, root: int) -> None:
-    """Raise ConfigError unless the root hangs on the world by a free joint, and nothing else moves."""
+    """Raise ConfigError unless the root floats by a free joint, and nothing else moves."""
     name, top = model.body(root).name, int(model.body_rootid[root])
     line = lineage(model, root)
     above = [i for i in range(model.njnt) if model.jnt_bodyid[i] in line]

@@ -25,20 +25,20 @@ def in_step(clip: RobotClip, robot: Robot) -> RobotClip:
         return clip
     lands = np.argwhere(clip.planted[1:] & ~clip.planted[:-1])
     row = WalkCommand(*clip.commands[0].tolist())
-    if not len(lands) or row.step_time <= 0.0:
+    swing = float(row.step_time)
+    if not len(lands) or swing <= 0.0:
         return clip
     _, commands = whole_walk(robot, clip.qpos, clip.dt, clip.commands)
     wanted = float(WalkCommand(*commands[1]).start) + float(lands[0, 0] + 1) * clip.dt
-    first, period = SHIFT + FIRST_STEP * row.step_time, row.step_time + BOTH / robot.omega - SOONER
+    first, period = SHIFT + FIRST_STEP * swing, swing + BOTH / robot.omega - SOONER
     steps = max(math.ceil((wanted - first) / period), 0)
-    begins = 0 if row.left > 0.0 else 1  # the foot of the side that it goes to, else the right one
+    begins = 0 if float(row.left) > 0.0 else 1  # the foot of the side that it goes to, or the right
     steps += (steps + begins + int(lands[0, 1])) % 2
     frames = round((first + steps * period - wanted) / clip.dt)
     if frames <= 0:
         return clip
     later = clip.commands.copy()
     np.asarray(WalkCommand(*later.T).start)[1:] += frames * clip.dt
-    held = (np.repeat(values[:1], frames, axis=0) for values in (clip.qpos, clip.planted))
-    qpos, planted = (np.concatenate([still, values])
-                     for still, values in zip(held, (clip.qpos, clip.planted), strict=True))  # fmt: skip
+    qpos, planted = (np.concatenate([np.repeat(values[:1], frames, axis=0), values])
+                     for values in (clip.qpos, clip.planted))  # fmt: skip
     return replace(clip, qpos=qpos, planted=planted, commands=later)

@@ -34,7 +34,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .in_step import in_step
-from .walked import find_commands
+from .walked import Walked, find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
@@ -117,7 +117,8 @@ def retarget_clip(
             reason = _climb(clip) or error.message
             if asked or error.field not in UNPERFORMED:
                 raise
-    free, walked = retarget_freely(clip, robot, smooth=smooth), None
+    free = retarget_freely(clip, robot, smooth=smooth)
+    walked: Walked | None = None
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:

@@ -103,7 +103,7 @@ def layouts(size: int, actions: int, joints: int) -> Iterator[Layout]:
 
     Positions and velocities are of the `joints` of the robot or of those that are moved.
     """
-    seldom = []
+    seldom: list[Layout] = []
     options = [
         (tuple(name for name, _ in (*chosen,) if name), sum(n for _, n in chosen))
         for chosen in product(*MAYBE)
