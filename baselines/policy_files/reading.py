@@ -12,6 +12,7 @@ from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build, on_base
 
 from .bounds import with_pairs
+from .checkpoints import check_no_checkpoint
 from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
 from .known import RIVALS, expect_network
@@ -137,5 +138,6 @@ def _network(name: str | None, folder: Path, source: Path) -> tuple[Path, str]:
         raise ConfigError(f"no such file: {path}", source=source, field="policy")
     version = digest(path, source)  # what is missing beside it is said before onnxruntime finds it
     if is_script(path):
+        check_no_checkpoint(path)
         check_allowed(str(path))
     return path, version

@@ -20,6 +20,7 @@ from .description import (
 )
 from .floors import check_ground, install_ground
 from .ground import can_touch
+from .model_check import check_root
 from .models.mjcf import pointing_to_scenes, read_mjcf
 from .models.tree import lineage
 from .models.urdf import read_urdf
@@ -124,8 +125,11 @@ class _Guess:
         model = self.model
         free = [int(model.jnt_bodyid[i]) for i in range(model.njnt)
                 if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_FREE]  # fmt: skip
+        if not free and model.nbody == 1:
+            raise _unsure("the model has no body", "root")
         if not free:
-            raise _unsure("no body floats by a free joint", "root")
+            largest = int(np.bincount(model.body_rootid[1:], minlength=2).argmax())
+            check_root(model, largest)  # which says what it hangs by instead
         return max(free, key=lambda body: np.count_nonzero(model.body_rootid == body))
 
     def _feet(self) -> tuple[int, int]:

@@ -45,7 +45,7 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription) -> None:
     for field, name in named.items():
         if name not in bodies:
             raise ConfigError(f"the model has no body {shown(name)}", field=field, choices=bodies)
-    _check_root(model, bodies[description.root])
+    check_root(model, bodies[description.root])
     if int(mujoco.mjtJoint.mjJNT_BALL) in model.jnt_type:
         raise _wrong("ball joints are not supported")
     loops = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
@@ -60,8 +60,8 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription) -> None:
             )
 
 
-def _check_root(model: mujoco.MjModel, root: int) -> None:
-    """The root hangs on the world by a free joint, and nothing else moves."""
+def check_root(model: mujoco.MjModel, root: int) -> None:
+    """Raise ConfigError unless the root floats by a free joint, and nothing else moves."""
     name, top = model.body(root).name, int(model.body_rootid[root])
     line = lineage(model, root)
     above = [i for i in range(model.njnt) if model.jnt_bodyid[i] in line]

@@ -33,7 +33,8 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .walked import find_commands
+from .in_step import in_step
+from .walked import Walked, find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
@@ -116,21 +117,25 @@ def retarget_clip(
             reason = _climb(clip) or error.message
             if asked or error.field not in UNPERFORMED:
                 raise
-    free, tempo, walker, factor = retarget_freely(clip, robot, smooth=smooth), 1.0, "", 1.0
+    free = retarget_freely(clip, robot, smooth=smooth)
+    walked: Walked | None = None
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
-            commands, tempo, name, more = find_commands(clip, robot, free.scale, ENOUGH)
-            walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
+            found = find_commands(clip, robot, free.scale, ENOUGH)
+            walks = replace(free.clip, commands=found.commands, dt=free.clip.dt / found.tempo)
+            walks = in_step(walks, robot)
             reference_from(walks, robot, clip.name)
-            seen, walker, factor = walks, name, more
+            seen, walked = walks, found
         except ConfigError as error:
             if error.field == "speed":
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
     made = _stepped(free._replace(clip=seen), scene)
-    stride = 1.0 if walker else made.stride
-    return made._replace(tempo=tempo, walker=walker, stride=stride, asked=factor)
+    if walked is None:
+        return made._replace(tempo=1.0)
+    return made._replace(tempo=walked.tempo, walker=walked.walker, stride=walked.way,
+                         asked=walked.asked)  # fmt: skip
 
 
 def _climb(clip: Clip) -> str:

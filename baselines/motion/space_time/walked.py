@@ -1,12 +1,13 @@
 """Commands of a step planner by which a robot walks and turns as a clip does."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
-from poise.baselines.balance.references.reference_motion import COLUMNS, MOST_COMMANDS, faster
+from poise.baselines.balance.references.reference_motion import MOST_COMMANDS, faster
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import (
@@ -18,10 +19,14 @@ from poise.baselines.motion.clips.contacts import (
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
+from .in_step import BOTH
+
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 STRIDE = 0.6  # [s] without a foot on the ground: longer is no run
 LONGEST = 0.72  # [h] of a step: further, robots fall
+SHARE = 0.7  # of a clip's way times its tempo, from which its own steps are taken
+OWN, EARLY = 0.66, 0.02  # [h] of a step that lasts as the clip's; [s] by which soles touch early
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
 REACHES = 0.47  # [hω] that `walk-fast` reaches, whatever the command
@@ -34,27 +39,29 @@ BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer on
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
 QUICKEST = 0.75  # [1/ω] of a swing; and what it lasts at most:
-SLOWEST = 2.0
-BOTH = 0.13  # [1/ω] that planners stand on both feet between two swings
+SLOWEST = 3.0
 
 
 class Walked(NamedTuple):
     """Commands (n, 5) in the clip's time, how many times as fast as the clip that is, the packaged
-    controller or policy that walks so, and its commanded speed over that speed, as it is slower."""
+    controller or policy that walks so, its commanded speed over that speed, as it is slower, and
+    the length of its steps over the clip's."""
 
     commands: np.ndarray
     tempo: float
     walker: str
     asked: float = 1.0
+    way: float = 1.0
 
 
 def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) -> Walked:
     """The velocity along the heading [m/s], the turning rate [rad/s] and the time of a swing [s] of
     a clip, step by step; a time of 0 is that of the walker's gait.
 
-    Both are means over two steps, times `scale`, the ratio of the legs. Where the clip is too fast
-    for legs to follow, all is slower. Where it bends too sharply, steps are shorter and quicker. A
-    run is walked.
+    Velocities are means over two steps, times `scale`, the ratio of the legs. Steps last as the
+    clip's where that is possible at `least` of its way times its tempo. Otherwise, where the clip
+    is too fast for legs to follow, all is slower, and where it bends too sharply, steps are shorter
+    and quicker. A run is walked.
 
     Raises:
         ConfigError: both feet leave the ground at once, or for 0.6 s; it takes no two steps, goes
@@ -98,14 +105,12 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
         raise ConfigError(f"{run}it goes at {speed.max():.2f} m/s, and the planner of walks at "
                           f"{bound:.2f} m/s at most{in_curves}, {tempo:.2f} of it (--speed "
                           f"{tempo:.2f} plays it so)", source=clip.name, field="speed")  # fmt: skip
-    each = max(period, walk.duration / MOST_COMMANDS)
-    rows = []
-    for start in np.arange(0.0, walk.duration, each):
-        own = slice(round(start / RATE), max(round((start + each) / RATE), round(start / RATE) + 1))
-        row = np.zeros(COLUMNS)
-        row[:] = start, ahead[own].mean(), left[own].mean(), turn[own].mean(), period
-        rows.append(row)
-    commands = faster(np.array(rows), tempo)
+    each = _steps(lands, period, walk.duration)
+    rows = np.array([[start, *(rate[_frames(start, end)].mean() for rate in (ahead, left, turn)),
+                      own] for start, end, own in each])  # fmt: skip
+    if own := _own_steps(rows, robot, max(least, SHARE)):
+        return own
+    commands = faster(rows, tempo)
     if learned:
         commands[:, 4] = 0.0  # it was trained at its gait's own
         bent = float(np.abs(commands[:, 1] * commands[:, 3]).max())
@@ -115,6 +120,47 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     commands[:, 4] = _swings(commands, h, omega)
     quick = np.hypot(commands[:, 1], commands[:, 2]).max() > STEADY * h * omega
     return Walked(commands, tempo, WALK_FAST if quick else WALK)
+
+
+def _steps(lands: np.ndarray, period: float, duration: float) -> list[tuple[float, float, float]]:
+    """Begin and end of each step of a clip, and what it lasts [s]: for the first and the last one,
+    which the clip cuts, and where feet land together, that is the `period`."""
+    ends = [0.0]
+    for time in (*lands, duration):
+        if time - ends[-1] >= TOGETHER:
+            ends.append(float(time))
+    if len(ends) > MOST_COMMANDS:
+        ends = np.linspace(0.0, duration, MOST_COMMANDS).tolist()
+    pairs = list(pairwise(ends))
+    inner = range(1, len(pairs) - 1) if len(ends) < MOST_COMMANDS else ()
+    return [(a, b, b - a if k in inner else period) for k, (a, b) in enumerate(pairs)]
+
+
+def _frames(start: float, end: float) -> slice:
+    """Of the times from `start` to `end` [s]."""
+    first = round(start / RATE)
+    return slice(first, max(round(end / RATE), first + 1))
+
+
+def _own_steps(rows: np.ndarray, robot: Robot, least: float) -> Walked | None:
+    """A walk by `walk` whose steps last as the clip's, shorter and slower as need be; None where
+    it would go less than `least` of the clip's way times its tempo."""
+    h, omega = robot.height_com, robot.omega
+    going, turning = np.hypot(rows[:, 1], rows[:, 2]), np.abs(rows[:, 3])
+    times, bend = rows[:, 4], float((going * turning).max())
+    if (turning * times).max() > MOST_TURN:
+        return None
+    way = min(OWN * h / max(float((going * times).max()), 1e-9), 1.0)
+    tempo = min(1.0, BRISK * h * omega / max(way * float(going.max()), 1e-9),
+                BEND * h * omega / max(way * float((going * turning * times).max()), 1e-9),
+                np.sqrt(BANK * robot.units.gravity / max(way * bend, 1e-9)),
+                float(times.min()) * omega / (QUICKEST + BOTH))  # fmt: skip
+    slowest = (SLOWEST + BOTH) / omega
+    if way * tempo < least or (times / tempo).max() > slowest:
+        return None
+    commands = faster(rows * [1.0, way, way, 1.0, 1.0], tempo)
+    commands[:, 4] -= BOTH / omega - EARLY
+    return Walked(commands, float(tempo), WALK, way=way)
 
 
 def _swings(commands: np.ndarray, h: float, omega: float) -> np.ndarray:

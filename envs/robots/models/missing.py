@@ -25,7 +25,7 @@ def drop_missing(spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...]) -> None
     Raises:
         ConfigError: a foot collides with a missing mesh, or a body has its mass from it.
     """
-    if unopened(spec) is None:
+    if unopened(spec.copy()) is None:  # a mesh that MuJoCo has read keeps faces of it
         return
     missing: dict[str, dict[str, str]] = {}
     files: list[str] = []

@@ -1,6 +1,7 @@
 """Read a URDF file by MuJoCo's own reader: as it stands in ROS, with a root that floats."""
 
 import os
+import re
 import sysconfig
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
@@ -16,6 +17,9 @@ from .mjcf_bounds import MJCF_BYTES, MjcfText, check_spec
 
 PACKAGE = "package://"
 PACKAGES = "ROS_PACKAGE_PATH"  # of the environment: folders of packages, separated by colons
+#: of a name that does not depend on where the file lies, on Windows too
+ABSOLUTE = re.compile(r"package://|file://|/|[A-Za-z]:[/\\]")
+ABOVE = 3  # folders in which the end of a name is looked for
 MESHES = (".stl", ".obj", ".msh")  # that MuJoCo reads
 HIDDEN = 3  # group of collision geometry, which pictures leave out where there is something to see
 WHEELS = (
@@ -71,14 +75,27 @@ def find_file(name: str, near: Path) -> Path | None:
 
     ``package://NAME/rest`` is looked for in a folder NAME that is a parent of `near` or lies in one
     of its parents, then in the folders of ROS_PACKAGE_PATH, then where wheels of the cmeel family
-    put packages. Any other name is relative to `near`.
+    put packages. Any other name is relative to `near`. What is there not, or a path of another
+    machine, is looked for by its last folders beside `near`, then one and two folders above.
     """
     if not name.startswith(PACKAGE):
         files = [near.parent / name.removeprefix("file://")]
     else:
         package, _, rest = name.removeprefix(PACKAGE).lstrip("/").partition("/")
         files = [folder / rest for folder in _package_folders(package, near)]
-    return next(filter(is_file, files), None)
+    return next(filter(is_file, [*files, *_ends(name, near)]), None)
+
+
+def _ends(name: str, near: Path) -> Iterator[Path]:
+    """Where the ends of an absolute name may lie, the longest end first."""
+    root = ABSOLUTE.match(name)
+    if root is None:
+        return
+    parts = [part for part in name[root.end() :].replace("\\", "/").split("/") if part]
+    if ".." not in parts:
+        for first in range(1, len(parts)):
+            for folder in [*near.resolve().parents][:ABOVE]:
+                yield folder.joinpath(*parts[first:])
 
 
 def _package_folders(package: str, near: Path) -> Iterator[Path]:

@@ -53,9 +53,13 @@ def test_an_mjcf_file_that_faces_backwards_and_bends_the_other_way(tmp_path: Pat
 
 TAIL = '<body name="tail"><joint/><geom size="0.05" pos="0 0 -0.7"/></body>'
 RIGHT = '<body name="right_thigh"'
+#: as in humanoid-gym and what was made from it
+SLIDES = "".join(f'<joint type="slide" axis="{x}"/>' for x in ("1 0 0", "0 1 0", "0 0 1"))
+SLIDES += '<joint type="ball"/>'
 UNSURE = {
     "three legs": ((RIGHT, TAIL + RIGHT), "more than two limbs end low"),
-    "no free joint": (("<freejoint/>", ""), "no body floats"),
+    "no free joint": (("<freejoint/>", ""), "give the body 'trunk' a free joint, <freejoint/>"),
+    "slides and a ball": (("<freejoint/>", SLIDES), "replace them by a free joint"),
     "tilted feet": (
         ('pos="0.03 0 -0.04"', 'pos="0.03 0 -0.04" euler="0 30 0"'),
         "no posture stands with both soles flat .* has no flat side",
@@ -67,7 +71,8 @@ UNSURE = {
 def test_what_is_not_sure_is_asked_for(tmp_path: Path, change: tuple[str, str], text: str) -> None:
     path = write_biped(tmp_path).with_suffix(".xml")
     path.write_text(path.read_text().replace(*change))
-    with pytest.raises(ConfigError, match=f"{text}.*: write a description .* docs/robots.md"):
+    advice = "" if "free joint" in text else ": write a description .* docs/robots.md"
+    with pytest.raises(ConfigError, match=f"{text}.*{advice}"):
         load_robot(path)
 
 

@@ -7,6 +7,7 @@ from itertools import product
 from pathlib import Path
 
 from poise.baselines.allowance import check_allowed, is_script
+from poise.baselines.policy_files.checkpoints import check_no_checkpoint
 from poise.baselines.policy_files.clip_network import JOINTS
 from poise.baselines.policy_files.motion.config import TIME_STEP
 from poise.baselines.policy_files.networks import onnx_session
@@ -77,9 +78,10 @@ class Layout:
 def network_sizes(path: Path) -> Sizes:
     """Return the sizes of a network; TorchScript, which is code, must have been allowed.
 
-    Raises ConfigError as `onnx_session` and `check_allowed` do.
+    Raises ConfigError as `onnx_session`, `check_no_checkpoint` and `check_allowed` do.
     """
     if is_script(path):
+        check_no_checkpoint(path)
         check_allowed(str(path))
         observation, action = script_sizes(path)
         return Sizes({"observation": observation}, {"action": action})
@@ -97,10 +99,11 @@ def _numbers(shape: list[object]) -> int | None:
 
 
 def layouts(size: int, actions: int, joints: int) -> Iterator[Layout]:
-    """Usual observations of this size, the shortest history first.
+    """Usual observations of this size, the shortest history first; last, trackers with a history.
 
     Positions and velocities are of the `joints` of the robot or of those that are moved.
     """
+    seldom: list[Layout] = []
     options = [
         (tuple(name for name, _ in (*chosen,) if name), sum(n for _, n in chosen))
         for chosen in product(*MAYBE)
@@ -112,9 +115,14 @@ def layouts(size: int, actions: int, joints: int) -> Iterator[Layout]:
             sizes = [(name, each * actions + fixed) for name, each, fixed in terms]
             frame = sum(numbers for _, numbers in sizes)
             if frame * steps == size:
-                yield Layout(tuple(f"{name} {numbers}" for name, numbers in sizes), frame, steps)
+                layout = Layout(tuple(f"{each} {m}" for each, m in sizes), frame, steps)
+                if steps == 1:
+                    yield layout
+                else:
+                    seldom.append(layout)
         for n, (names, more) in product(dict.fromkeys((actions, joints)), options):
             frame = 6 + 2 * n + actions + more
             if frame * steps == size:
                 own = (f"joint_pos_rel {n}", f"joint_vel {n}", f"last_action {actions}")
                 yield Layout((*(f"{each} 3" for each in ALWAYS), *names, *own), frame, steps)
+    yield from seldom

@@ -125,11 +125,12 @@ def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
     ahead, left, turn = np.abs(commands[:, 1:4]).max(axis=0)
     planted = made.clip.planted
     run = planted is not None and not planted.any(axis=1).all()
+    less = "" if made.stride == 1.0 else f", its steps {made.stride:.2f} of their length"
     return [
         (
             "performed by a planner that walks",
-            f"{'a run as a walk, ' if run else ''}at {made.tempo:.2f} of the clip's speed: up to "
-            f"{np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s "
+            f"{'a run as a walk, ' if run else ''}at {made.tempo:.2f} of the clip's speed{less}: "
+            f"up to {np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s "
             f"(--controller {made.walker})",
         )
     ]

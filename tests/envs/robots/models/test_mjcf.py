@@ -204,6 +204,18 @@ def test_only_the_file_that_is_missing_is(tmp_path: Path) -> None:
     assert [model.mesh(i).name for i in range(model.nmesh)] == ["q_hull"]
 
 
+def test_a_file_is_missed_beside_one_that_is_there(tmp_path: Path) -> None:
+    """Of other faces than a made-up mesh has, which MuJoCo keeps where it has once read them."""
+    faces = write_stl(tmp_path / "hull.stl").read_bytes()[84:]
+    (tmp_path / "hull.stl").write_bytes(b"\0" * 80 + (8).to_bytes(4, "little") + faces + faces)
+    asset = MESH + '<mesh name="lost" file="lost.stl"/>'
+    trunk = "".join(f'<geom type="mesh" mesh="{name}" mass="0"/>' for name in ("hull", "lost"))
+    path = write_biped(tmp_path, asset=asset, trunk=trunk).with_suffix(".xml")
+    with pytest.warns(PoiseWarning, match=r"1 files are missing \(lost.stl\)"):
+        read = read_mjcf(path, ())
+    assert [mesh.name for mesh in read.meshes] == ["hull"] and read.compile() is not None
+
+
 @pytest.mark.parametrize("place", ["by a relative path", "by an absolute one", "from inside"])
 def test_an_included_file_names_meshes_relative_to_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str

@@ -102,6 +102,21 @@ def test_a_sole_by_the_name_of_its_collision_or_its_link(tmp_path: Path) -> None
         assert np.ptp(sole.polygon[:, 0]) == pytest.approx(length), name
 
 
+def test_meshes_of_another_machine(tmp_path: Path) -> None:
+    """By the last folders of their names, near the file; those of a package whose folder was
+    renamed too. A relative name that is not there stays missing."""
+    mesh_file = write_stl(tmp_path / "copied/meshes/a.stl")
+    beside = tmp_path / "copied/robot.urdf"
+    for name in ("/home/her/ws/robot/meshes/a.stl", "file:///home/her/robot/meshes/a.stl",
+                 "F:/RobotProject/robot/meshes/a.stl", "F:\\robot\\meshes\\a.stl",
+                 "package://her_robot/meshes/a.stl"):  # fmt: skip
+        for near in (beside, tmp_path / "copied/urdf/robot.urdf"):
+            assert find_file(name, near) == mesh_file, name
+        assert find_file(name, tmp_path / "copied/a/b/c/robot.urdf") is None
+    for name in ("her/meshes/a.stl", "/home/her/../meshes/a.stl", "package://her_robot/b.stl"):
+        assert find_file(name, beside) is None, name
+
+
 def test_meshes_of_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Above the file, then in ROS_PACKAGE_PATH; files of one name in two folders stay two."""
     beside = write_stl(tmp_path / "ws/my_robot/meshes/a.stl")

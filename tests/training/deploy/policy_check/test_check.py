@@ -81,6 +81,13 @@ def test_trackers_are_guessed(size: int, parts: tuple[str, ...]) -> None:
     assert all(part in text for part in parts), text
 
 
+def test_a_history_is_of_a_walk_before_it_is_of_a_tracker() -> None:
+    """480 of the G1 is 5 × 96, as unitree_rl_lab exports it, and at last 3 × 160."""
+    found = [str(layout) for layout in layouts(480, 29, 29)]
+    assert found[0].startswith("480 = 5 × 96: a history of 5 steps of base_ang_vel 3")
+    assert found[-1].startswith("480 = 3 × 160: a history of 3 steps of motion_command 58")
+
+
 def test_a_network_with_a_clip_is_a_tracker(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -93,6 +100,25 @@ def test_a_network_with_a_clip_is_a_tracker(
     assert "it tracks a motion, whose frames it gives for each time_step" in text
     assert "perhaps 134 = motion_command 50 + motion_anchor_ori_b 6" in text
     assert "motion: {clip: network} observations: - {term: motion_command}" in text
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_a_checkpoint_is_no_network(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: bool
+) -> None:
+    """That is told before anybody is asked to trust it: nothing in it is run."""
+    path = tmp_path / "model_3200.pth"
+    states = {"model_state_dict": torch.nn.Linear(84, N).state_dict(), "iter": 3200}
+    torch.save(states, path, _use_new_zipfile_serialization=not old)
+    described = write_yaml(
+        tmp_path / "own.yaml", kind="policy-file", policy=path.name,
+        observations=[{"term": "base_ang_vel"}],
+    )  # fmt: skip
+    for line in (["policies", "check", str(path)], ["policies", "check", str(described)]):
+        assert main([*line, "--robot", "compact"]) == 2
+        text = capsys.readouterr().err
+        assert text.startswith(f"poise: {path}: is a checkpoint of weights"), text
+        assert "export the policy as ONNX or TorchScript" in text and "--allow" not in text
 
 
 def test_a_bare_script_is_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,6 +17,7 @@ from poise.baselines.balance.references.robot_clip import (
     write_robot_clip,
 )
 from poise.baselines.motion.retargeting.retarget import retarget_freely
+from poise.baselines.motion.space_time.in_step import in_step
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.baselines.motion.space_time.walked import find_commands
 from poise.configs.errors import ConfigError
@@ -42,11 +43,11 @@ def walking(name: str) -> RobotClip:
 @pytest.mark.parametrize("name", SPEEDS)
 def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
     scale, robot = 0.9, robot_named(HUMANOID)
-    commands, tempo, *_ = find_commands(make(name)[0], robot, scale)
+    commands, tempo, _, _, way = find_commands(make(name)[0], robot, scale)
     ahead, left, turn = SPEEDS[name]
     told = np.median(commands[:, 1:4], axis=0)
-    assert told == pytest.approx([scale * ahead, scale * left, turn], abs=0.06)
-    assert tempo == 1.0
+    assert told == pytest.approx([way * scale * ahead, way * scale * left, turn], abs=0.06)
+    assert tempo == 1.0 and 0.7 <= way <= 1.0 and (way < 1.0) == (name == "walk")
     lands = np.sort(np.concatenate(CAPTURES[name].stances)[:, 0])
     period = np.median(np.diff(lands))
     assert (commands[:, 4] < period).all()
@@ -54,12 +55,26 @@ def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
         assert commands[:, 4] + 0.037 == pytest.approx(period, abs=0.045)  # with both feet down
 
 
+def test_steps_are_the_clip_s_where_legs_can() -> None:
+    """Shorter ones, that last as long, and begin with the clip's."""
+    clip, robot = make("walk")[0], robot_named(HUMANOID)
+    free = retarget_freely(clip, robot)
+    found = find_commands(clip, robot, free.scale)
+    lasts = np.diff(found.commands[1:, 0])
+    assert found.commands[1:-1, 4] + 0.037 - 0.02 == pytest.approx(lasts, abs=0.002)
+    length = found.commands[1:-1, 1] * lasts
+    assert length.max() == pytest.approx(0.66 * robot.height_com, rel=0.03)
+    walks = in_step(replace(free.clip, commands=found.commands), robot)
+    (trial,) = follow(reference_from(walks, robot, "walk"), found.walker, starts=1)
+    assert not trial.fallen and trial.footsteps_kept >= 0.9 and abs(trial.footstep_delay) < 0.1
+
+
 @pytest.mark.parametrize("name", ["circle", "run-curve"])
 def test_a_curve_is_told_as_one_from_begin_to_end(name: str) -> None:
     """A course that goes on straight beyond its ends leads aside there, and chords are short."""
     robot = robot_named(HUMANOID)
     ahead, turn = {"circle": (0.7, 0.95), "run-curve": (2.4, 0.8)}[name]
-    commands, tempo, _, asked = find_commands(make(name)[0], robot, 0.9)
+    commands, tempo, _, asked, _ = find_commands(make(name)[0], robot, 0.9)
     assert commands[:, 1] == pytest.approx(asked * tempo * 0.9 * ahead, rel=0.01)
     assert commands[:, 2] == pytest.approx(0.0, abs=0.01)
     assert commands[:, 3] == pytest.approx(tempo * turn, rel=0.01)
@@ -86,7 +101,7 @@ def test_the_way_of_a_clip_that_is_walked_is_what_the_planner_is_told(
 def test_what_is_too_fast_is_slower_and_says_so() -> None:
     """By the controller that reaches it; the policy is told more than it reaches."""
     robot, h_omega = robot_named(HUMANOID), 2.779
-    commands, tempo, walker, asked = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
+    commands, tempo, walker, asked, _ = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
     assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.06
     assert commands[:, 1] == pytest.approx(asked * tempo * 1.9 * 1.2 * 0.9, abs=0.06)
     assert commands[:, 1].max() <= 1.06 * 0.585 * h_omega + 1e-3
@@ -94,9 +109,9 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
     with pytest.raises(ConfigError, match=r"at 1\.6\d m/s at most, 0\.\d\d of it") as refused:
         find_commands(make("walk")[0].at_speed(1.9), robot, 0.9, least=tempo + 0.01)
     assert refused.value.field == "speed"
-    commands, tempo, walker, _ = find_commands(make("walk")[0].at_speed(1.18), robot, 0.9)
-    assert tempo == 1.0 and walker == "walk-fast"
-    assert (commands[:, 4] + 0.037 < 0.35).all()  # brisk walks have quick steps
+    brisk = find_commands(make("walk")[0].at_speed(1.18), robot, 0.9, least=0.9)
+    assert brisk.tempo == 1.0 and brisk.walker == "walk-fast"
+    assert (brisk.commands[:, 4] + 0.037 < 0.35).all()  # brisk walks have quick steps
     assert find_commands(make("walk")[0], robot, 0.9).walker == "walk"
     other = find_commands(make("walk")[0].at_speed(1.9), robot_named("compact"), 0.9)
     assert other.walker == "walk" and other.tempo < 0.7  # whose gains are of no fast walk
@@ -105,7 +120,7 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
 def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
     """At the steps of its own gait; other robots are slower instead."""
     robot, clip = robot_named(HUMANOID), make("run-curve")[0]
-    commands, tempo, walker, asked = find_commands(clip, robot, 0.9)
+    commands, tempo, walker, asked, _ = find_commands(clip, robot, 0.9)
     assert walker == "residual-walk-fast" and 0.7 <= tempo < 0.75
     assert (commands[:, 4] == 0.0).all() and 1.5 < commands[:, 1].max() / asked < 1.6
     assert asked > 1.03 and (commands[:, 1] * commands[:, 3]).max() <= 0.0911 * 9.81
