@@ -75,15 +75,20 @@ def find_file(name: str, near: Path) -> Path | None:
 
     ``package://NAME/rest`` is looked for in a folder NAME that is a parent of `near` or lies in one
     of its parents, then in the folders of ROS_PACKAGE_PATH, then where wheels of the cmeel family
-    put packages. Any other name is relative to `near`. What is there not, or a path of another
-    machine, is looked for by its last folders beside `near`, then one and two folders above.
+    put packages. Any other name is relative to `near`.
     """
     if not name.startswith(PACKAGE):
         files = [near.parent / name.removeprefix("file://")]
     else:
         package, _, rest = name.removeprefix(PACKAGE).lstrip("/").partition("/")
         files = [folder / rest for folder in _package_folders(package, near)]
-    return next(filter(is_file, [*files, *_ends(name, near)]), None)
+    return next(filter(is_file, files), None)
+
+
+def find_mesh(name: str, near: Path) -> Path | None:
+    """`find_file`, else by the last folders of a package's or another machine's name, looked for
+    beside `near`, then one and two folders above."""
+    return find_file(name, near) or next(filter(is_file, _ends(name, near)), None)
 
 
 def _ends(name: str, near: Path) -> Iterator[Path]:
@@ -162,7 +167,7 @@ def _take_meshes(spec: mujoco.MjSpec, files: dict[str, str], path: Path) -> None
     """Give the meshes their files. Where one cannot be had, what is only seen of it goes."""
     lost = set()
     for mesh in spec.meshes:
-        file = find_file(files[mesh.name], path)
+        file = find_mesh(files[mesh.name], path)
         if file is None or file.suffix.lower() not in MESHES:
             lost.add(mesh.name)
         else:
@@ -177,7 +182,7 @@ def _take_meshes(spec: mujoco.MjSpec, files: dict[str, str], path: Path) -> None
 
 def _unread(name: str, link: str, path: Path) -> ConfigError:
     """A mesh with which a link collides, and that there is not, or not in a form for MuJoCo."""
-    if find_file(name, path) is not None:
+    if find_mesh(name, path) is not None:
         reason = f"is not of a form that MuJoCo reads ({', '.join(MESHES)}): convert it to one"
     elif name.startswith(PACKAGE):
         reason = f"is missing: its package is looked for above {path.parent} and in {PACKAGES}"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.robots.models.urdf import PACKAGES, find_file
+from poise.envs.robots.models.urdf import PACKAGES, find_file, find_mesh
 from poise.envs.robots.robot import Robot, load_robot
 from tests.support.small_urdf import BOX_SOLE, INERTIAL, JOINTS, LIMIT, mesh, write_stl, write_urdf
 
@@ -111,10 +111,10 @@ def test_meshes_of_another_machine(tmp_path: Path) -> None:
                  "F:/RobotProject/robot/meshes/a.stl", "F:\\robot\\meshes\\a.stl",
                  "package://her_robot/meshes/a.stl"):  # fmt: skip
         for near in (beside, tmp_path / "copied/urdf/robot.urdf"):
-            assert find_file(name, near) == mesh_file, name
-        assert find_file(name, tmp_path / "copied/a/b/c/robot.urdf") is None
+            assert find_mesh(name, near) == mesh_file, name
+        assert find_mesh(name, tmp_path / "copied/a/b/c/robot.urdf") is None
     for name in ("her/meshes/a.stl", "/home/her/../meshes/a.stl", "package://her_robot/b.stl"):
-        assert find_file(name, beside) is None, name
+        assert find_mesh(name, beside) is None, name
 
 
 def test_meshes_of_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
