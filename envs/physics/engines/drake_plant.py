@@ -56,9 +56,9 @@ class DrakePlant:
 
     Bodies, inertias, joints, armature (as rotor inertia) and damping are those of the model;
     springs, dry friction and gravity compensation are forces of the caller, who names the limits
-    that joints are beyond (`step`). The ground bears points (`ground_points`) whose friction is that
-    of MuJoCo's pair, by a circular cone; bodies touch each other by their shapes. Joints of one
-    body are chained by bodies without mass.
+    that joints are beyond (`step`). The ground bears points (`ground_points`) whose friction is
+    that of MuJoCo's pair, by a circular cone; bodies touch each other by their shapes. Joints of
+    one body are chained by bodies without mass.
 
     Attributes:
         plant, context: Drake's plant, and its part of a diagram's context.
