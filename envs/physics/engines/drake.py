@@ -12,6 +12,7 @@ from .config import Physics
 from .engine import Engine
 from .geometry import rotation_of
 from .held import check_held
+from .limits import JointLimits
 
 if TYPE_CHECKING:
     from .drake_plant import DrakePlant
@@ -19,13 +20,17 @@ if TYPE_CHECKING:
 #: of a model, what a plant is made of
 MADE_OF = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_damping", "dof_armature"),
-    *("geom_friction", "geom_solref", "pair_friction", "pair_solref", "jnt_range"),
+    *("geom_friction", "geom_solref", "pair_friction", "pair_solref"),
+    *("jnt_limited", "jnt_range", "jnt_margin", "jnt_solref", "jnt_solimp", "dof_invweight0"),
 )
+HIGH = 0.15  # [m] above the ground, standing: a geom whose points are left out while it is high
+REACH = 0.05  # [m] by which a geom may come down in a step
 DIVERGED = int(mujoco.mjtWarning.mjWARN_BADQACC)
 
 
 class DrakeEngine(Engine):
-    """Drake: dynamics, joint limits, damping and contact; see `DrakePlant`.
+    """Drake: dynamics, damping and contact; see `DrakePlant`. Joint limits are those of the model,
+    by MuJoCo's law (`JointLimits`).
 
     Torques and pushes, springs and gravity compensation enter as generalised forces, constant in a
     physics step. Dry friction of joints, which Drake's plant does not have, is a torque that is new
@@ -49,11 +54,13 @@ class DrakeEngine(Engine):
         self._feet = _feet(robot)
         self._callback = Callback(self._step)
         self._made: tuple[bytes, ...] = ()
-        self._plant: DrakePlant | None = None
+        self._plants: dict[bool, DrakePlant] = {}  # with the points of high geoms, and without
+        self._plant: DrakePlant | None = None  # of the last step
+        self._high = _high(robot)
         self.begin()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**super().__getstate__(), "_plant": None, "_made": ()}
+        return {**super().__getstate__(), "_plants": {}, "_plant": None, "_made": ()}
 
     @property
     def stepper(self) -> CallbackAddress:
@@ -66,28 +73,38 @@ class DrakeEngine(Engine):
         self._callback.check()
         plant, d = self._current(), self.data
         plant.write(d.qpos, d.qvel)
-        plant.step(
-            plant.to_drake(rotation_of(d.qpos[3:7]), self._forces() + self._friction(d.qvel))
-        )
+        given = plant.to_drake(rotation_of(d.qpos[3:7]), self._forces() + self._friction(d.qvel))
+        plant.step(given, self._limits.beyond(d.qpos, d.qvel))
         wrench, bodies = plant.contacts()
         self._tell(wrench, bodies, d.qpos)
 
     def _current(self) -> "DrakePlant":
         """The plant of the model as it is now."""
-        from .drake_plant import DrakePlant
-
         model = self.robot.model
         arrays = *(getattr(model, name) for name in MADE_OF), model.opt.gravity
         made = tuple(array.tobytes() for array in arrays)
-        if self._plant is None or made != self._made:
+        if not self._plants or made != self._made:
+            self._plants, self._made = {}, made
+            self._limits = JointLimits(self.robot)
+        return self._near()
+
+    def _near(self) -> "DrakePlant":
+        """The plant with the points that can reach the ground in this step."""
+        from .drake_plant import DrakePlant
+
+        model, high = self.robot.model, self._high
+        low = bool((self.data.geom_xpos[high, 2] < model.geom_rbound[high] + REACH).any())
+        if low not in self._plants:
             # a negative number is a stiffness of the model's own
             soft = np.where(self._solref > 0.0, model.geom_solref[:, 0] / self._solref, 1.0)
-            self._plant, self._made = DrakePlant(self.robot, self.physics, soft), made
+            apart = () if low else high.tolist()
+            self._plants[low] = DrakePlant(self.robot, self.physics, soft, apart)
+        self._plant = self._plants[low]
         return self._plant
 
     def _step(self) -> None:
         """Take a physics step, see `Engine`."""
-        plant, d = self._plant or self._current(), self.data
+        plant, d = self._near() if self._plants else self._current(), self.data
         forces, start = self._forces(), np.array(d.qpos)
         wrench, count = np.zeros(6), self.physics.substeps
         bodies: list[int] = []
@@ -98,7 +115,7 @@ class DrakeEngine(Engine):
             plant.write(d.qpos, d.qvel)
             given = plant.to_drake(rotation_of(d.qpos[3:7]), forces + self._friction(d.qvel))
             try:
-                values = plant.step(given)
+                values = plant.step(given, self._limits.beyond(d.qpos, d.qvel))
             except RuntimeError as error:  # numbers so large that its solver finds no solution
                 if not any(word in str(error) for word in ("converge", "NaN")):
                     raise
@@ -125,7 +142,7 @@ class DrakeEngine(Engine):
     def _friction(self, qvel: np.ndarray) -> np.ndarray:
         most = self.robot.model.dof_frictionloss
         if not most.any():
-            return np.zeros_like(qvel)
+            return most
         timestep = self.robot.model.opt.timestep / self.physics.substeps
         return -np.clip(self._stop * qvel / timestep, -most, most)
 
@@ -134,7 +151,8 @@ class DrakeEngine(Engine):
         pose (nq,)."""
         d, root = self.data, qpos[:3]
         d.qfrc_constraint[:3] = wrench[:3]
-        moment = wrench[3:] - np.cross(root, wrench[:3])
+        x, y, z, (a, b, c) = *root, wrench[:3]
+        moment = wrench[3:] - np.array([y * c - z * b, z * a - x * c, x * b - y * a])
         d.qfrc_constraint[3:6] = rotation_of(qpos[3:7]).T @ moment
         for name, own in self._feet.items():
             d.sensordata[self.robot.sensor_adr[name]] = sum(body in own for body in bodies)
@@ -155,6 +173,17 @@ def _stopping_inertia(robot: Robot) -> np.ndarray:
     stop = free / max(1.0, largest)
     stop[:6] = 0.0
     return np.asarray(stop)
+
+
+def _high(robot: Robot) -> np.ndarray:
+    """Geoms that are high above the ground when the robot stands; those of soles are not."""
+    model, data = robot.model, mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_kinematics(model, data)
+    moving = model.body_weldid[model.geom_bodyid] != 0
+    soles = {geom for sole in robot.soles for geom in sole.geom_ids}
+    high = moving & (data.geom_xpos[:, 2] > model.geom_rbound + HIGH)
+    return np.array([geom for geom in np.flatnonzero(high) if geom not in soles], dtype=int)
 
 
 def _feet(robot: Robot) -> dict[str, set[int]]:

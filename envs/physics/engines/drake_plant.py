@@ -1,7 +1,7 @@
-"""A robot in Drake, made from the arrays of its MuJoCo model; alone imports Drake."""
+"""A robot in Drake, made from the arrays of its MuJoCo model."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -28,6 +28,7 @@ from pydrake.multibody.plant import (
 )
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
+    JointActuator,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
@@ -42,7 +43,9 @@ from poise.envs.robots.ground import pair_friction
 from poise.envs.robots.robot import Robot
 
 from .config import Physics
+from .drake_limits import LimitDampers
 from .geometry import GEOM, ground_points, mesh_vertices, rotation_of, touching_pairs
+from .limits import LimitForces
 
 POINT = 1e-6  # [m] radius of a ball that stands for a corner
 SLIPPERY, ROUGH = 1e-9, 1e9  # friction: Drake takes the harmonic mean, 2 μ₁ μ₂/(μ₁ + μ₂)
@@ -51,10 +54,11 @@ SLIPPERY, ROUGH = 1e-9, 1e9  # friction: Drake takes the harmonic mean, 2 μ₁ 
 class DrakePlant:
     """A robot on level ground, and where its coordinates are in MuJoCo's.
 
-    Bodies, inertias, joints, armature (as rotor inertia), damping and limits are those of the
-    model; springs, dry friction and gravity compensation are forces of the caller. The ground bears
-    points (`ground_points`) whose friction is that of MuJoCo's pair, by a circular cone; bodies
-    touch each other by their shapes. Joints of one body are chained by bodies without mass.
+    Bodies, inertias, joints, armature (as rotor inertia) and damping are those of the model;
+    springs, dry friction and gravity compensation are forces of the caller, who names the limits
+    that joints are beyond (`step`). The ground bears points (`ground_points`) whose friction is
+    that of MuJoCo's pair, by a circular cone; bodies touch each other by their shapes. Joints of
+    one body are chained by bodies without mass.
 
     Attributes:
         plant, context: Drake's plant, and its part of a diagram's context.
@@ -62,9 +66,12 @@ class DrakePlant:
         bodies: Drake's body index → MuJoCo's.
     """
 
-    def __init__(self, robot: Robot, physics: Physics, softer: np.ndarray):
-        """`softer` (ngeom,): by how much the contacts of each geom are softer than its model's."""
+    def __init__(self, robot: Robot, physics: Physics, softer: np.ndarray,
+                 apart: Collection[int] = ()):  # fmt: skip
+        """`softer` (ngeom,): by how much the contacts of each geom are softer than its model's;
+        geoms `apart` do not touch the ground."""
         self.robot, model = robot, robot.model
+        self._apart = apart
         self._stiffness = 2.0 * robot.mass * robot.units.gravity / physics.sink
         self._relaxation, self._softer = physics.relaxation, softer
         self._dissipation = float(physics.dissipation)
@@ -80,6 +87,7 @@ class DrakePlant:
         self.bodies: dict[int, int] = {}
         self._links: dict[int, RigidBody] = {0: self.plant.world_body()}
         self._joints: list[Any] = []
+        self._rotors: dict[int, JointActuator] = {}  # of joints with armature, or limits
         for body in range(1, model.nbody):
             self._add_body(body)
         self._add_ground()
@@ -103,6 +111,7 @@ class DrakePlant:
         self._reference = self.robot.model.qpos0[7:].copy()
         self._force_port = plant.get_applied_generalized_force_input_port()
         self._given = self._force_port.FixValue(self.context, np.zeros(plant.num_velocities()))
+        self._limits = LimitDampers(plant, self.context, self._rotors, self.qvel)
         self._results = plant.get_contact_results_output_port()
 
     def _add_body(self, body: int) -> None:
@@ -134,20 +143,17 @@ class DrakePlant:
         at = RigidTransform(np.array(model.jnt_pos[joint]))
         outer = plant.AddFrame(FixedOffsetFrame(f"outer{joint}", parent.body_frame(), place @ at))
         inner = plant.AddFrame(FixedOffsetFrame(f"inner{joint}", child.body_frame(), at))
-        low, high = -np.inf, np.inf
-        if model.jnt_limited[joint]:
-            low, high = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
         hinge = model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_HINGE)
         kind = RevoluteJoint if hinge else PrismaticJoint
         made = plant.AddJoint(
-            kind(f"joint{joint}", outer, inner, axis, float(low), float(high),
-                 float(model.dof_damping[dof]))
-        )  # fmt: skip
+            kind(f"joint{joint}", outer, inner, axis, float(model.dof_damping[dof]))
+        )
         self._joints.append(made)
-        if model.dof_armature[dof] > 0.0:
+        if model.dof_armature[dof] > 0.0 or model.jnt_limited[joint]:
             rotor = plant.AddJointActuator(f"rotor{joint}", made)
             rotor.set_default_gear_ratio(1.0)
             rotor.set_default_rotor_inertia(float(model.dof_armature[dof]))
+            self._rotors[joint - 1] = rotor
 
     def _inertia(self, body: int, name: str) -> SpatialInertia:
         """About the body's origin, from the principal axes that MuJoCo keeps."""
@@ -174,6 +180,8 @@ class DrakePlant:
         )
         self._points, self._shapes = [], {}
         for each in ground_points(self.robot):
+            if each.geom in self._apart:
+                continue
             link = self._links[int(model.geom_bodyid[each.geom])]
             # half of the mean with something very rough is the coefficient itself
             material = self._material(max(0.5 * each.friction, SLIPPERY), each.geom)
@@ -247,12 +255,11 @@ class DrakePlant:
         v[self.qvel] = vector[6:]
         return v
 
-    def step(self, forces: np.ndarray) -> np.ndarray:
-        """Drake's positions and velocities after a step with generalised forces, in its order."""
+    def step(self, forces: np.ndarray, beyond: LimitForces | None = None) -> np.ndarray:
+        """Drake's positions and velocities after a step with generalised forces, in its order, and
+        those of limits that push."""
         self._given.GetMutableData().get_mutable_value().SetFromVector(forces)
-        update = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context)
-        values: np.ndarray = update.get_vector().CopyToVector()
-        return values
+        return self._limits.step(beyond)
 
     def read(self, values: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Write what `step` returned into MuJoCo's state."""

@@ -20,7 +20,8 @@ from poise.envs.compiled import sources
 ROOT = Path(__file__).resolve().parents[3]
 FILES = sorted(path for room in ("envs", "baselines") for path in (ROOT / room).rglob("*.py"))
 if importlib.util.find_spec("pydrake") is None:
-    FILES = [path for path in FILES if path.name != "drake_plant.py"]  # needs poise[drake]
+    need = ("drake_plant.py", "drake_limits.py")  # poise[drake]
+    FILES = [path for path in FILES if path.name not in need]
 
 
 def modules_of(statement: ast.stmt, file: Path) -> set[str]:

@@ -1,4 +1,4 @@
-"""A robot in Drake is the robot in MuJoCo, but for contact, friction and limits."""
+"""A robot in Drake is the robot in MuJoCo, but for contact and friction."""
 
 import mujoco
 import numpy as np
@@ -16,6 +16,7 @@ from poise.envs.robots.robot import load_robot
 
 pytest.importorskip("pydrake", reason="Drake is not installed: pip install --no-deps drake")
 
+from poise.envs.physics.engines import drake
 from poise.envs.physics.engines.drake import DrakeEngine
 from poise.envs.physics.engines.drake_plant import DrakePlant
 from tests.support.refused import invalid
@@ -208,6 +209,26 @@ def test_ground_bears_what_changes_momentum():
         expected = state.contact_wrench[3:] + np.cross(com, gravity)
         np.testing.assert_allclose(moment, expected, rtol=0, atol=0.02 * robot.units.force)
     assert force[2] > 0.5 * robot.units.force
+
+
+def test_points_are_left_out_only_while_they_are_high(monkeypatch):
+    """A robot that falls flat from a lean has the same bits with all its points."""
+    robot, ends = load_robot(), []
+    for high in (drake.HIGH, np.inf):
+        monkeypatch.setattr(drake, "HIGH", high)
+        simulation = Simulation(robot)
+        simulation.engine = engine = DrakeEngine(robot, simulation.data, DRAKE)
+        qpos = robot.standing_qpos.copy()
+        mujoco.mju_euler2Quat(qpos[3:7], np.array([0.0, 1.3, 0.0]), "xyz")
+        qpos[2] = 0.6
+        simulation.reset(qpos)
+        for _ in range(150):
+            simulation.step(np.zeros(robot.model.nu))
+        assert simulation.state.other_contact
+        ends.append((simulation.data.qpos.copy(), len(engine._plants)))
+    (one, plants), (other, alone) = ends
+    assert (plants, alone) == (2, 1)
+    np.testing.assert_array_equal(one, other)
 
 
 def test_dry_friction_holds_a_joint_and_brakes_it():
