@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypedDict
 
 import poise
+from poise.configs.texts import LONGEST
 
 LIBRARIES = ("mujoco", "numpy", "numba", "torch", "stable-baselines3", "gymnasium", "scipy")
 
@@ -49,9 +50,10 @@ def circumstances(started: float, workers: int, backend: str) -> Circumstances:
 
 
 def command_line() -> str:
-    """Return the command line without the program's folder."""
+    """Return the command line without the program's folder, cut where no reader would take it."""
     program = Path(sys.argv[0]).name
-    return shlex.join(["poise" if program == "__main__.py" else program, *sys.argv[1:]])
+    text = shlex.join(["poise" if program == "__main__.py" else program, *sys.argv[1:]])
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
 def versions(names: tuple[str, ...] = LIBRARIES) -> dict[str, str]:

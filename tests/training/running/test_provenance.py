@@ -9,6 +9,7 @@ import mujoco
 import pytest
 
 import poise
+from poise.configs.texts import LONGEST
 from poise.training.running import provenance
 
 ROOT = Path(__file__).parents[3]
@@ -49,3 +50,10 @@ def test_the_machine_is_named() -> None:
     """Processor and number of cores that may be used."""
     machine = provenance.machine()
     assert machine["processor"] and machine["cores"] == provenance.usable_cores() >= 1
+
+
+def test_a_long_command_is_cut_to_what_results_may_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A result with more characters is refused when it is read."""
+    monkeypatch.setattr("sys.argv", ["poise", "evaluate", *["walk"] * 2000])
+    command = provenance.command_line()
+    assert len(command) == LONGEST and command.endswith("…") and " walk walk " in command

@@ -18,6 +18,7 @@ from poise.training.running.terminal import steps_bar
 from .records import SeedEntry, SeedSummary, evaluations, start_and_best
 
 PERIOD = 1.0  # [s] between looks
+BEFORE = "no checkpoint yet: compiling, evaluating the start, first updates"
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class SeedProgress:
         self.runs = runs
         self._bar = steps_bar("seed {task.fields[seed]}", console)
         self._tasks = [
-            self._bar.add_task("", total=run.config.steps, seed=run.config.seed, rate="")
+            self._bar.add_task("", total=run.config.steps, seed=run.config.seed, rate=BEFORE)
             for run in runs
         ]
         self._end = threading.Event()
