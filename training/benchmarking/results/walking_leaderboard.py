@@ -119,9 +119,15 @@ def _levels(entry: Entry, part: str) -> list[WalkLevel]:
     return [level for level in entry.get("walks", ()) if level["part"] == part]
 
 
+def _stands(entry: Entry) -> bool:
+    """Whether it takes no stride where it is commanded to walk: its J50 is that of standing."""
+    return all(level["step_length"] is None and not level["fallen"]
+               for level in _levels(entry, UNPUSHED))  # fmt: skip
+
+
 def _order(entry: Entry) -> tuple[bool, bool, float]:
     j50 = entry.get("j50_mean")
-    return assisted(entry), j50 is None, -(j50 or 0.0)
+    return assisted(entry) or _stands(entry), j50 is None, -(j50 or 0.0)
 
 
 def _by_one_verdict(entries: Mapping[str, Entry]) -> dict[str, Entry]:
@@ -143,13 +149,14 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
     head = ["", "controller", J50_MEAN.heading, "worst direction",
             "not fallen, pushed", "as commanded again", *(f"kicked {kick}" for kick in kicks),
             "fell unpushed", "as commanded, unpushed"]  # fmt: skip
-    rank, rows = shared_ranks(entries, ("j50_mean", ".1f")), []
+    walking = {name: entry for name, entry in entries.items() if not _stands(entry)}
+    rank, rows = shared_ranks(walking, ("j50_mean", ".1f")), []
     for name in names:
         entry, walks = entries[name], _levels(entries[name], UNPUSHED)
         fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)
         followed = sum(w["recovered"] for w in walks)
         kicked = {level["level"]: level for level in _levels(entry, KICKED)}
-        rows.append([str(rank[name] or NONE), code(name), *_j50(entry), *_pushes(entry),
+        rows.append([str(rank.get(name) or NONE), code(name), *_j50(entry), *_pushes(entry),
                      *(_upright(kicked.get(kick)) for kick in kicks),
                      f"{fallen} of {trials}", f"{followed} of {trials}"])  # fmt: skip
     return head, rows

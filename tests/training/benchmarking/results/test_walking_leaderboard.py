@@ -184,3 +184,21 @@ def test_kicks_have_a_column_each_and_levels_tables_of_their_own(tmp_path: Path)
         "`walk`": ["18 of 20", "5 of 20"], "`walk-spring`": ["–", "–"]}  # fmt: skip
     assert [row[:2] for row in rows(field)[2:3]] == [["1", "`walk`"]]
     assert rows(field)[2][2] == ranked[1][2] and "kicked" not in field
+
+
+def test_a_controller_that_stands_where_it_is_to_walk_has_no_rank(tmp_path: Path) -> None:
+    """It falls less than one that walks, and comes last; a fall is no standing."""
+
+    def stand(data: dict[str, Any]) -> None:
+        for level in data["controllers"]["walk"]["walks"]:
+            level["step_length"], level["fallen"] = None, 0
+
+    def fall(data: dict[str, Any]) -> None:
+        stand(data)
+        data["controllers"]["walk"]["walks"][0]["fallen"] = 1
+
+    for change, order in ((stand, {"1": "`walk-spring`", "–": "`walk`"}),
+                          (fall, {"1": "`walk`", "2": "`walk-spring`"})):  # fmt: skip
+        standing = changed(tmp_path / "standing.json", ONE, change)
+        page = write_leaderboard([standing, OTHER], tmp_path / "page.md")
+        assert {row[0]: row[1] for row in rows(page.read_text()) if row[0] in order} == order
