@@ -505,7 +505,7 @@ def test_the_current_folder_plants_nothing(ground: Ground) -> None:
     (ground.here / ".numba_config.yaml").write_text(
         f"cache_dir: {ground.here}\ncache_locator_classes: {ground.module}.Trap\n"
     )
-    ground.policy("momentum-qp")
+    ground.policy("momentum-qp-compensated")
     code = (
         "import poise; poise.load_policy('policy'); import numba, poise.training.cli; "
         "assert not numba.config.CACHE_DIR and not numba.config.CACHE_LOCATOR_CLASSES; "

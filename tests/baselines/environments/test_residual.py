@@ -23,6 +23,7 @@ from poise.envs.balance.mdp.reward import RewardWeights
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.balance.vector.batch import replicate
 from poise.envs.physics.simulation import Simulation
+from poise.envs.sensing.push_force import SMOOTHING
 from tests.support.shared import robot
 
 PUSH = {"impulse": 9.0, "direction": 30.0, "start": 0.1, "body": "torso"}
@@ -435,7 +436,8 @@ def test_a_policy_sees_the_phase_of_the_motion() -> None:
 
 def test_the_estimated_force_is_observed_along_the_heading():
     """`push_force` and `push_mean` are what the controller's own estimate finds, in their units."""
-    config = {"base": "momentum-qp", "compensation": {"gain": 0.0, "reach": 0.0}}
+    alike = {"gain": 0.0, "reach": 0.0, "smoothing": SMOOTHING}
+    config = {"base": "momentum-qp", "compensation": alike}
     extra = {"observation": {"extra": ["push_force", "push_mean"], "privileged": ["push"]}}
     env = ResidualBalanceEnv(robot(), extra, controller=config, pushes=None, duration=4.0)
     push = {"body": "torso", "force": 12.0, "duration": 4.0, "direction": 90.0, "start": 0.2}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.velocity import VelocityEnv
-from poise.baselines.environments.velocity_terms import MEAN_TIME
+from poise.baselines.walking.correction import MEAN_TIME
 from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.vector.batch import EnvBatch, replicate
