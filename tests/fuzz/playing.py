@@ -11,7 +11,6 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import poise
@@ -22,7 +21,6 @@ from .kinds import Kind
 from .values import Json
 
 SECONDS = 8.0  # of the processor that a case may take; a film of a fall has some 60 pictures
-MILLION = 0.051  # [s] of a million additions in Python on the processor of which that is said
 MEBIBYTES = 1024.0  # that a case may take besides what the process has
 TEXT = 5000  # characters of an error; some list the choices
 ROOT = Path(poise.__file__).parents[2]
@@ -51,22 +49,13 @@ class Outcome:
         return self.verdict in ("worked", "refused")
 
 
-@cache
-def slowness() -> float:
-    """How many times as long as on that processor things take here, at least 1."""
-    started, total = time.process_time(), 0
-    for number in range(1_000_000):
-        total += number
-    return max((time.process_time() - started) / MILLION, 1.0)
-
-
 def play(kind: Kind, case: Json) -> Outcome:
     """Play a case here and now; only what ends the process or does not end is not seen."""
     memory.reset_peak()
     before, started = memory.in_use(), time.process_time()
     verdict, what, details = _verdict(kind, case)
     seconds, grown = time.process_time() - started, memory.peak() - before
-    if verdict in ("worked", "refused") and seconds > SECONDS * slowness():
+    if verdict in ("worked", "refused") and seconds > SECONDS:
         verdict, what = "hang", f"{kind.name}: took {seconds:.0f} s"
     if verdict in ("worked", "refused") and grown > MEBIBYTES:
         verdict, what = "memory", f"{kind.name}: took {grown:.0f} MiB"
