@@ -20,7 +20,7 @@ from . import memory
 from .kinds import Kind
 from .values import Json
 
-# of the processor that a case may take; a film of a fall has some 60 pictures, 5 to 23 s without a GPU
+# of the processor that a case may take; a film has some 60 pictures, 5 to 23 s without a GPU
 SECONDS = 30.0
 MEBIBYTES = 1024.0  # that a case may take besides what the process has
 TEXT = 5000  # characters of an error; some list the choices
