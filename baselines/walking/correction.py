@@ -60,8 +60,8 @@ def odometry(s: StateArrays) -> tuple[float, float, float]:
 
 @compiled
 def correct_course(c: Correction):
-    """Take in a policy step. Of an axis that has no business δ is zero: all while it is commanded
-    to stand, the speeds while it turns in place."""
+    """Update v̄ and δ by a policy step. δ is zero while the command is to stand; that of the speeds
+    is zero while it is to turn in place."""
     found = odometry(c.state)
     walks = c.command[0] != 0.0 or c.command[1] != 0.0
     for a in range(3):

@@ -12,16 +12,20 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
+
+import mujoco
+import numpy as np
 
 import poise
 from poise.configs.errors import PoiseError
+from poise.envs.viewing.offscreen import OffScreen
 
 from . import memory
 from .kinds import Kind
 from .values import Json
 
-# of the processor that a case may take; a film has some 60 pictures, 5 to 23 s without a GPU
-SECONDS = 30.0
+SECONDS = 8.0  # of the processor that a case may take, but for what OpenGL draws without a GPU
 MEBIBYTES = 1024.0  # that a case may take besides what the process has
 TEXT = 5000  # characters of an error; some list the choices
 ROOT = Path(poise.__file__).parents[2]
@@ -50,12 +54,29 @@ class Outcome:
         return self.verdict in ("worked", "refused")
 
 
+@contextlib.contextmanager
+def _drawing() -> Iterator[list[float]]:
+    """A list that gets the processor's seconds of each picture that is drawn meanwhile."""
+    draw, drawn = OffScreen.draw, list[float]()
+
+    def timed(screen: OffScreen, scene: mujoco.MjvScene) -> np.ndarray:
+        started = time.process_time()
+        try:
+            return draw(screen, scene)
+        finally:
+            drawn.append(time.process_time() - started)
+
+    with mock.patch.object(OffScreen, "draw", timed):
+        yield drawn
+
+
 def play(kind: Kind, case: Json) -> Outcome:
     """Play a case here and now; only what ends the process or does not end is not seen."""
     memory.reset_peak()
     before, started = memory.in_use(), time.process_time()
-    verdict, what, details = _verdict(kind, case)
-    seconds, grown = time.process_time() - started, memory.peak() - before
+    with _drawing() as drawn:
+        verdict, what, details = _verdict(kind, case)
+    seconds, grown = time.process_time() - started - sum(drawn), memory.peak() - before
     if verdict in ("worked", "refused") and seconds > SECONDS:
         verdict, what = "hang", f"{kind.name}: took {seconds:.0f} s"
     if verdict in ("worked", "refused") and grown > MEBIBYTES:
