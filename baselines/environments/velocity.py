@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from poise.baselines.controller import COMMAND_ENTRIES
+from poise.baselines.walking.admittance import QUICK_TIME, Admittance, give_way
 from poise.baselines.walking.calibration import Calibration
 from poise.baselines.walking.correction import MEAN_TIME, Correction, correct_course
 from poise.baselines.walking.planner.command import GaitCommand
@@ -40,6 +41,7 @@ class VelocityStep(PositionStep):
 
     course: Course
     correction: Correction
+    admittance: Admittance
 
 
 @compiled
@@ -48,6 +50,7 @@ def velocity_step(step: VelocityStep):
     drive_step(step)
     follow_course(step.course)
     correct_course(step.correction)
+    give_way(step.admittance)
     end_step(step.end)
 
 
@@ -103,6 +106,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
         self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
         self._odometry, self._shift = guarded_zeros(3), guarded_zeros(3)
+        self._quick, self._way = guarded_zeros(2), guarded_zeros(2)
         super().__init__(robot, config, **arguments)
 
     def arguments(self) -> dict[str, Any]:
@@ -118,6 +122,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         super()._begin(options)
         self._known_orders[:], self._mean[:] = 0.0, 0.0
         self._odometry[:], self._shift[:] = 0.0, 0.0
+        self._quick[:], self._way[:] = 0.0, 0.0
         self._begin_walk(options)
         self._error[:] = -self._known_orders[:3]
 
@@ -132,7 +137,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         return self._known_orders[:3]
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
-        read = self._known_orders, self._error, self._calibrated, self._shift
+        read = self._known_orders, self._error, self._calibrated, self._shift, self._way
         return read if kind is CommandView else super()._readings(kind)
 
     def _step_members(self) -> dict[str, Any]:
@@ -153,7 +158,16 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
             part=part,
             rate=self.calibration.correction * period,
         )
-        return {**super()._step_members(), "course": course, "correction": correction}
+        admittance = Admittance(
+            state=self.state_source.state_arrays,
+            mean=self._odometry,
+            quick=self._quick,
+            way=self._way,
+            part=float(-np.expm1(-period / QUICK_TIME)),
+            gain=self.calibration.admittance,
+        )
+        own = {"course": course, "correction": correction, "admittance": admittance}
+        return {**super()._step_members(), **own}
 
     def _report(self) -> Program:
         return Program.of([(follow_timetable, self._follower(self._known_orders))])

@@ -29,6 +29,7 @@ class CommandView(Block):
     error: np.ndarray  # (3,) see `Course`
     calibration: CalibrationArrays
     shift: np.ndarray  # (3,) of a `Correction`
+    way: np.ndarray  # (2,) of an `Admittance`
 
 
 @compiled
@@ -44,8 +45,8 @@ VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environme
 @VELOCITY_TERMS.add(GROUND, "0.2 ω h", "commanded velocity, ahead and to the left", "vector")
 def command_velocity(t: CommandView):
     seen, unit, still = t.seen, t.seen.scales.velocity, stands_still(t)
-    seen.out[0] = observed_ahead(t.calibration, t.command, still, t.shift[0]) / unit
-    seen.out[1] = observed_left(t.calibration, t.command, still, t.shift[1]) / unit
+    seen.out[0] = observed_ahead(t.calibration, t.command, still, t.shift[0], t.way[0]) / unit
+    seen.out[1] = observed_left(t.calibration, t.command, still, t.shift[1], t.way[1]) / unit
 
 
 @VELOCITY_TERMS.add(("z",), "0.2 ω", "commanded turning rate, to the left", "turn")

@@ -35,6 +35,7 @@ class Calibration:
             0: never.
         start: s of ahead, left [m/s] and turn [rad/s].
         correction: k [1/s] of the integral of the velocity's error, see `correction.py`; 0: none.
+        admittance: κ of how far it gives way to a push, see `admittance.py`; 0: not at all.
     """
 
     ahead: Knots = ()
@@ -45,6 +46,7 @@ class Calibration:
     still: float = field(default=0.0, metadata={"min": 0.0})
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     correction: float = field(default=0.0, metadata={"min": 0.0, "max": 5.0})
+    admittance: float = field(default=0.0, metadata={"min": 0.0, "max": 5.0, "omit": "default"})
 
     def __post_init__(self) -> None:
         for name in AXES:
@@ -115,22 +117,23 @@ def begun(seen: float, command: float, start: float) -> float:
 
 @compiled
 def observed_ahead(
-    c: CalibrationArrays, command: np.ndarray, still: bool, shift: float = 0.0
+    c: CalibrationArrays, command: np.ndarray, still: bool, shift: float = 0.0, way: float = 0.0
 ) -> float:
     """The speed ahead of a command (≥ 3,) as it is observed, by a robot that stands `still` or not;
-    `shift` is δ of a `Correction`."""
-    seen = through(c.ahead, command[0] + shift)
+    `shift` is δ of a `Correction`, `way` y of an `Admittance`."""
+    seen = through(c.ahead, command[0] + shift) + way
     leads = command[0] != 0.0
     return begun(seen, command[0], c.start_ahead) if still and leads else seen
 
 
 @compiled
 def observed_left(
-    c: CalibrationArrays, command: np.ndarray, still: bool, shift: float = 0.0
+    c: CalibrationArrays, command: np.ndarray, still: bool, shift: float = 0.0, way: float = 0.0
 ) -> float:
     """The same of the speed to the left."""
     aside = command[0] == 0.0
     seen = through(c.aside if aside and c.aside.shape[0] > 0 else c.left, command[1] + shift)
+    seen += way
     leads = aside and command[1] != 0.0
     return begun(seen, command[1], c.start_left) if still and leads else seen
 

@@ -1,0 +1,77 @@
+"""baselines/walking/admittance.py: a walk gives way to a push for a while, and to nothing else."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.walking.admittance import DEAD, MOST, Admittance, give_way
+from poise.baselines.walking.calibration import Calibration, observed_ahead, observed_left
+from poise.baselines.walking.correction import MEAN_TIME, Correction, correct_course, odometry
+from tests.support.physics import forward
+from tests.support.shared import generic_state
+
+PERIOD = 0.02  # [s]
+
+
+def moving(speed):
+    """A robot's state in which `odometry`, which is linear in q̇, has found `speed` (2,)."""
+    simulation = generic_state(seed=1)
+
+    def found(qvel):
+        simulation.data.qvel[:] = qvel
+        forward(simulation)
+        return np.array(odometry(simulation.state_arrays)[:2])
+
+    rows = np.array([found(unit) for unit in np.eye(simulation.data.qvel.size)]).T
+    np.testing.assert_allclose(found(np.linalg.pinv(rows) @ speed), speed, atol=1e-9)
+    return simulation.state_arrays
+
+
+def laws(state, part, gain=1.0):
+    command, mean = np.array([0.5, *np.zeros(7)]), np.zeros(3)
+    course = Correction(state, command, mean, np.zeros(3), 1.0 - np.exp(-PERIOD / MEAN_TIME), 0.0)
+    return course, Admittance(state, mean, np.zeros(2), np.zeros(2), part, gain)
+
+
+@pytest.mark.parametrize("gain", [0.5, 1.0])
+def test_it_is_what_exceeds_the_dead_zone_along_the_change_of_velocity(gain):
+    """y = κ (1 − d/‖w − v̄‖) (w − v̄), w = v at once where `part` is 1."""
+    speed = np.array([0.6, -0.5])
+    course, admittance = laws(moving(speed), 1.0, gain)
+    correct_course(course)
+    give_way(admittance)
+    error = speed - course.mean[:2]
+    size = np.linalg.norm(error)
+    assert size > DEAD
+    np.testing.assert_allclose(admittance.way, gain * (1.0 - DEAD / size) * error)
+
+
+def test_a_change_that_is_small_or_lasts_gives_nothing():
+    """Less than the dead zone: y = 0. What lasts becomes the mean, after some `MEAN_TIME`."""
+    course, admittance = laws(moving([0.2, 0.2]), 1.0)
+    correct_course(course)
+    give_way(admittance)
+    np.testing.assert_array_equal(admittance.way, 0.0)
+    course, admittance = laws(moving([1.5, 0.0]), 1.0)
+    ways = []
+    for _ in range(100):
+        correct_course(course)
+        give_way(admittance)
+        ways.append(admittance.way[0])
+    assert ways[0] > 0.9 and np.all(np.diff(ways) <= 0.0)
+    assert ways[int(2 * MEAN_TIME / PERIOD)] == 0.0
+
+
+def test_each_axis_has_a_limit():
+    course, admittance = laws(moving([3.0, -4.0]), 1.0)
+    correct_course(course)
+    give_way(admittance)
+    np.testing.assert_array_equal(admittance.way, [MOST, -MOST])
+
+
+def test_it_is_added_to_what_is_observed():
+    """u = f(c + δ) + y, also where the robot stands and is not to walk."""
+    arrays = Calibration(ahead=((0.0, 0.0), (1.0, 2.0)), left=((0.0, 0.0), (1.0, 3.0))).arrays()
+    command = np.array([0.5, 0.25, *np.zeros(6)])
+    assert observed_ahead(arrays, command, False, 0.1, -0.4) == pytest.approx(1.2 - 0.4)
+    assert observed_left(arrays, command, False, 0.05, 0.2) == pytest.approx(0.9 + 0.2)
+    assert observed_ahead(arrays, np.zeros(8), False, 0.0, 0.7) == 0.7
