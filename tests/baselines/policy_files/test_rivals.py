@@ -240,6 +240,19 @@ def booster_gym() -> Loop:
     return Loop(T1, default, kp, kd, 1.0, observe, list(range(11, 23)), bound=1.0)
 
 
+def unitree_gym() -> Loop:
+    """It sees and moves the legs, remembers, and its clock has gone on by a step at the first."""
+    kp = [100, 100, 100, 150, 40, 40] * 2 + [300] * 3 + [100, 100, 50, 50, 20, 20, 20] * 2
+    kd = [2, 2, 2, 4, 2, 2] * 2 + [3] * 3 + [2, 2, 2, 2, 1, 1, 1] * 2
+
+    def observe(n: Now) -> np.ndarray:
+        phase = 2 * np.pi * (0.02 * (n.step + 1) % 0.8) / 0.8
+        return frame(0.25 * n.gyro, n.gravity, [0, 0, 0], (n.q - CROUCH)[:12], 0.05 * n.v[:12],
+                     n.action, np.sin(phase), np.cos(phase))  # fmt: skip
+
+    return Loop(G1, CROUCH, kp, kd, 0.25, observe, list(range(12)))
+
+
 def twist2() -> Loop:
     """This step, the ten before it (zeros at first), and the reference again."""
     leg = [-0.2, 0, 0, 0.4, -0.2, 0]
@@ -437,6 +450,7 @@ LOOPS: dict[str, Callable[[], Loop]] = {
     "twist2-tracker-g1": twist2_tracker,
     "unitree-dance-g1": unitree_dance,
     "unitree-g1-velocity": unitree_mjlab,
+    "unitree-gym-g1": unitree_gym,
     "unitree-lab-g1": unitree_lab,
     "unitree-mjlab-2026-03": unitree_mjlab_2026,
 }
