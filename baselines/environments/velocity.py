@@ -160,6 +160,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         )
         admittance = Admittance(
             state=self.state_source.state_arrays,
+            command=self._known_orders,
             mean=self._odometry,
             quick=self._quick,
             way=self._way,

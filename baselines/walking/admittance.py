@@ -3,10 +3,11 @@
 A push changes the velocity at once. To bring it back at once needs forces that a late motor on
 slippery ground does not give, so for some 0.5 s the policy observes a velocity that goes with it,
 
-    u = f(c + δ) + y,  y = κ D(w − v̄),  D(e) = max(1 − d/‖e‖, 0) e,  |y_a| ≤ `MOST`,
+    u = f(c + δ) + y,  y = κ max(1 − d/‖w − c‖, 0) (w − v̄),  |y_a| ≤ `MOST`,
 
 w the velocity by leg odometry, low-passed with `QUICK_TIME`, v̄ its mean and δ the correction of
-`correction.py`, d `DEAD`: the sway of a stride is no push.
+`correction.py`, d `DEAD`. y = 0 where (w − v̄)·(w − c) < 0: what leads to the command is no push,
+the robot begins to walk, or brakes.
 """
 
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ class Admittance(Block):
     """What `give_way` works on."""
 
     state: StateArrays  # the one that the policy observes
+    command: np.ndarray  # (8,) c, see `GaitCommand.array`
     mean: Annotated[np.ndarray, 3]  # v̄ of a `Correction`
     quick: Annotated[np.ndarray, 2]  # w ahead, left [m/s]
     way: Annotated[np.ndarray, 2]  # y
@@ -44,7 +46,9 @@ def give_way(a: Admittance):
     a.quick[0] += a.part * (ahead - a.quick[0])
     a.quick[1] += a.part * (left - a.quick[1])
     x, y = a.quick[0] - a.mean[0], a.quick[1] - a.mean[1]
-    size = np.hypot(x, y)
-    gain = a.gain * (1.0 - DEAD / size) if size > DEAD else 0.0
+    error_x, error_y = a.quick[0] - a.command[0], a.quick[1] - a.command[1]
+    error = np.hypot(error_x, error_y)
+    leaves = error > DEAD and x * error_x + y * error_y > 0.0
+    gain = a.gain * (1.0 - DEAD / error) if leaves else 0.0
     a.way[0] = min(max(gain * x, -MOST), MOST)
     a.way[1] = min(max(gain * y, -MOST), MOST)

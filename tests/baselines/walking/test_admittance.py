@@ -26,46 +26,49 @@ def moving(speed):
     return simulation.state_arrays
 
 
-def laws(state, part, gain=1.0):
-    command, mean = np.array([0.5, *np.zeros(7)]), np.zeros(3)
+def laws(state, part, gain=1.0, ahead=0.0):
+    command, mean = np.array([ahead, *np.zeros(7)]), np.zeros(3)
     course = Correction(state, command, mean, np.zeros(3), 1.0 - np.exp(-PERIOD / MEAN_TIME), 0.0)
-    return course, Admittance(state, mean, np.zeros(2), np.zeros(2), part, gain)
+    return course, Admittance(state, command, mean, np.zeros(2), np.zeros(2), part, gain)
+
+
+def taken(course, admittance):
+    correct_course(course)
+    give_way(admittance)
+    return admittance.way.copy()
 
 
 @pytest.mark.parametrize("gain", [0.5, 1.0])
-def test_it_is_what_exceeds_the_dead_zone_along_the_change_of_velocity(gain):
-    """y = κ (1 − d/‖w − v̄‖) (w − v̄), w = v at once where `part` is 1."""
+def test_it_is_the_change_of_velocity_as_far_as_it_leaves_the_command(gain):
+    """y = κ (1 − d/‖w − c‖) (w − v̄), w = v at once where `part` is 1."""
     speed = np.array([0.6, -0.5])
-    course, admittance = laws(moving(speed), 1.0, gain)
-    correct_course(course)
-    give_way(admittance)
-    error = speed - course.mean[:2]
-    size = np.linalg.norm(error)
+    course, admittance = laws(moving(speed), 1.0, gain, ahead=0.2)
+    way = taken(course, admittance)
+    size = np.linalg.norm(speed - (0.2, 0.0))
     assert size > DEAD
-    np.testing.assert_allclose(admittance.way, gain * (1.0 - DEAD / size) * error)
+    np.testing.assert_allclose(way, gain * (1.0 - DEAD / size) * (speed - course.mean[:2]))
 
 
-def test_a_change_that_is_small_or_lasts_gives_nothing():
-    """Less than the dead zone: y = 0. What lasts becomes the mean, after some `MEAN_TIME`."""
-    course, admittance = laws(moving([0.2, 0.2]), 1.0)
-    correct_course(course)
-    give_way(admittance)
-    np.testing.assert_array_equal(admittance.way, 0.0)
-    course, admittance = laws(moving([1.5, 0.0]), 1.0)
-    ways = []
-    for _ in range(100):
-        correct_course(course)
-        give_way(admittance)
-        ways.append(admittance.way[0])
-    assert ways[0] > 0.9 and np.all(np.diff(ways) <= 0.0)
-    assert ways[int(2 * MEAN_TIME / PERIOD)] == 0.0
+def test_what_is_near_the_command_or_leads_to_it_is_no_push():
+    """Less than the dead zone off; from rest to the commanded speed; braked after a push."""
+    near, starts = laws(moving([0.7, 0.1]), 1.0, ahead=0.5), laws(moving([0.5, 0.0]), 1.0, ahead=1.0)
+    brakes = laws(moving([0.8, 0.0]), 1.0)
+    brakes[1].mean[:2] = 1.5, 0.0
+    for each in (near, starts, brakes):
+        np.testing.assert_array_equal(taken(*each), 0.0)
+
+
+def test_what_lasts_gives_nothing():
+    """It becomes the mean, after some `MEAN_TIME`."""
+    both = laws(moving([1.5, 0.0]), 1.0)
+    ways = [taken(*both)[0] for _ in range(int(5 * MEAN_TIME / PERIOD))]
+    assert ways[0] > 0.9
+    assert np.all(np.diff(ways) <= 0.0)
+    assert ways[-1] < 0.02
 
 
 def test_each_axis_has_a_limit():
-    course, admittance = laws(moving([3.0, -4.0]), 1.0)
-    correct_course(course)
-    give_way(admittance)
-    np.testing.assert_array_equal(admittance.way, [MOST, -MOST])
+    np.testing.assert_array_equal(taken(*laws(moving([3.0, -4.0]), 1.0)), [MOST, -MOST])
 
 
 def test_it_is_added_to_what_is_observed():
