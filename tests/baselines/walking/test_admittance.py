@@ -51,7 +51,8 @@ def test_it_is_the_change_of_velocity_as_far_as_it_leaves_the_command(gain):
 
 def test_what_is_near_the_command_or_leads_to_it_is_no_push():
     """Less than the dead zone off; from rest to the commanded speed; braked after a push."""
-    near, starts = laws(moving([0.7, 0.1]), 1.0, ahead=0.5), laws(moving([0.5, 0.0]), 1.0, ahead=1.0)
+    near = laws(moving([0.7, 0.1]), 1.0, ahead=0.5)
+    starts = laws(moving([0.5, 0.0]), 1.0, ahead=1.0)
     brakes = laws(moving([0.8, 0.0]), 1.0)
     brakes[1].mean[:2] = 1.5, 0.0
     for each in (near, starts, brakes):
