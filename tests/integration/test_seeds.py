@@ -11,7 +11,7 @@ import pytest
 
 from tests.integration.test_docs import folder, parsed  # noqa: F401
 from tests.seeds.page import PAGE, page_of
-from tests.seeds.rows import ROOT, STATES, Document, Figure, load_documents
+from tests.seeds.rows import ROOT, STATES, Document, Figure, Row, Run, load_documents
 from tests.seeds.running import faults, prepare, run_alone, run_here, runs_of
 
 DOCUMENTS = load_documents()
@@ -90,6 +90,13 @@ def test_figures_are_read_and_compared() -> None:
         figure.read("velocity: 0.5 m/s")
     run = next(run for run in DAILY if run.exit == 0)
     assert list(faults(run, 1, "")) and list(faults(run, 0, "nothing"))
+
+
+def test_a_command_of_two_rows_has_the_figures_of_both() -> None:
+    one, other = Figure("a {}", 1.0, 0.0, ""), Figure("b {}", 2.0, 0.0, "")
+    rows = [Row("000", "", name, "", "works", runs=(Run("poise demo", figures=(figure,)),))
+            for name, figure in (("x", one), ("y", other), ("z", one))]  # fmt: skip
+    assert [run.figures for run in runs_of(rows)] == [(one, other)]
 
 
 @pytest.mark.parametrize("run", DAILY, ids=[run.run for run in DAILY])
