@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from poise.training.running.columns import J50_SCALED, PERFORMED
 from tests.integration.test_docs import folder, parsed  # noqa: F401
 from tests.seeds.page import PAGE, page_of
-from tests.seeds.rows import ROOT, STATES, Document, Figure, load_documents
+from tests.seeds.rows import ROOT, STATES, Document, Figure, Row, Run, load_documents
 from tests.seeds.running import faults, prepare, run_alone, run_here, runs_of
 
 DOCUMENTS = load_documents()
@@ -90,6 +91,30 @@ def test_figures_are_read_and_compared() -> None:
         figure.read("velocity: 0.5 m/s")
     run = next(run for run in DAILY if run.exit == 0)
     assert list(faults(run, 1, "")) and list(faults(run, 0, "nothing"))
+
+
+def test_j50_is_read_as_evaluate_prints_it() -> None:
+    """Of controllers named in a command, which `make weekly` alone runs."""
+    entry = {"fraction50": 1.0, "fraction50_ci95": (0.9, 1.2)}
+    figures = [figure for row in ROWS for figure in row.figures if "J50" in figure.unit]
+    for figure in figures:
+        name = figure.reads.split()[1]
+        bound = {"fraction50_bound": "lower"} if "≥" in figure.reads else {}
+        assert figure.read(f"│ 1 │ {name} │ {J50_SCALED.text(entry | bound)} │") == 1.0
+    assert len(figures) >= 12
+
+
+def test_errors_of_a_motion_are_read_by_the_words_of_their_columns() -> None:
+    reads = [figure.reads for row in ROWS for run in row.runs for figure in run.figures
+             if run.run.startswith("poise motion follow") and "│" in figure.reads]  # fmt: skip
+    assert {text.removesuffix(" │ {}") for text in reads} <= {each.words for each in PERFORMED}
+
+
+def test_a_command_of_two_rows_has_the_figures_of_both() -> None:
+    one, other = Figure("a {}", 1.0, 0.0, ""), Figure("b {}", 2.0, 0.0, "")
+    rows = [Row("000", "", name, "", "works", runs=(Run("poise demo", figures=(figure,)),))
+            for name, figure in (("x", one), ("y", other), ("z", one))]  # fmt: skip
+    assert [run.figures for run in runs_of(rows)] == [(one, other)]
 
 
 @pytest.mark.parametrize("run", DAILY, ids=[run.run for run in DAILY])

@@ -15,6 +15,11 @@ A leg that swings has a mass. Its angular momentum about the CoM has to change: 
 and back about the hip, by ℓ/h in T, at least by |α| = 4 (ℓ/T + v)/(h T) in the mean. L̇ = I α moves
 the CoP by L̇/(m g) from where the force points, so it adds L̇/m to what the knee bears, unless the
 trunk turns.
+
+Soles are flat while a foot leaves and the other bears. The leg behind, straight but for 2°, then
+holds the hip down, ℓ/2 + v t/2 ahead of its ankle with t on both feet, so the leg ahead is bent.
+Its knee bears nothing where that is the flexion that frees it with some CoP. In long steps it is
+more, and the least torque over CoP and lean is what a second-order pendulum's knee has to bear.
 """
 
 from __future__ import annotations
@@ -35,6 +40,9 @@ LEAST = np.radians(9.36)  # β of walk-double
 RIGID, KAPPA = np.radians(25.0), 18.0  # of walk-rigid and walk-spring
 RISE = np.radians(5.0)  # β of the spring's ℓ₀
 LEAN = np.radians(20.0)  # of the trunk, at most
+BOTH = 0.07  # on both feet [s]
+STRAIGHT = np.radians(2.0)  # β of the leg behind
+STEPS = ((0.22, 0.5), (0.33, 0.8), (0.43, 1.0), (0.6, 1.0))  # of walk-double, and the document's
 
 
 @dataclass(frozen=True)
@@ -95,11 +103,16 @@ def knee_torque(body: Plane, model: str, cop: float, ahead: float) -> np.ndarray
         if model == "double":
             flexion = max(free_flexion(body.thigh, body.shank, at, z, cop), LEAST)
             z = np.sqrt(max(length_at(body.thigh, body.shank, flexion) ** 2 - at**2, 0.0))
-        theta, _ = rod_angles(body.thigh, body.shank, flexion, at, z)
-        knee = body.shank * np.sin(theta), body.shank * np.cos(theta) + body.ankle
-        com = z + body.ankle + body.above
-        torque[i] = G * ((knee[0] - cop) - x[i] * knee[1] / com)
+        torque[i] = borne(body, flexion, at, z, cop, x[i])
     return torque
+
+
+def borne(body: Plane, flexion: float, hip: float, z: float, cop: float, before: float) -> float:
+    """τ/m of a leg with its hip at (`hip`, `z`) from the ankle, the CoM `before` the CoP [m]."""
+    theta, _ = rod_angles(body.thigh, body.shank, flexion, hip, z)
+    knee = body.shank * np.sin(theta), body.shank * np.cos(theta) + body.ankle
+    com = z + body.ankle + body.above
+    return float(G * ((knee[0] - cop) - before * knee[1] / com))
 
 
 def least_torque(body: Plane, model: str) -> tuple[float, float, float]:
@@ -110,6 +123,19 @@ def least_torque(body: Plane, model: str) -> tuple[float, float, float]:
         for o in np.linspace(0.0, body.lean, 7)
     ]
     return min(found)
+
+
+def flat_soles(body: Plane, step: float, speed: float) -> tuple[float, float, float]:
+    """The leg ahead when the foot behind leaves: its flexion and the largest that frees its knee
+    with a CoP of `body` [rad], and the least |τ|/m [N·m/kg] over CoP and lean."""
+    behind, ahead = 0.5 * (step + speed * BOTH), -0.5 * (step - speed * BOTH)
+    z = float(np.sqrt(length_at(body.thigh, body.shank, STRAIGHT) ** 2 - behind**2))
+    flexion = flexion_at(body.thigh, body.shank, float(np.hypot(ahead, z)))
+    cops = np.linspace(*body.cop, 61)
+    free = max(free_flexion(body.thigh, body.shank, ahead, z, p) for p in cops)
+    least = min(abs(borne(body, flexion, ahead, z, p, ahead + o - p))
+                for p in cops for o in np.linspace(0.0, body.lean, 7))  # fmt: skip
+    return flexion, free, least
 
 
 def swing_torque(robot: Robot, body: Plane, time: float) -> float:
@@ -155,6 +181,14 @@ def main() -> None:
             moved = np.abs(knee_torque(body, model, cop + 0.01, ahead)).mean() - least
             print(f"| {name} | {model} | {plain:.2f} | {least:.2f} | {cop:.3f}; {ahead:.3f} "
                   f"| {moved:+.3f} | {swing:.2f}; {slow:.2f} |")  # fmt: skip
+    print("\n| robot | step [m] | v [m/s] | leg ahead bent by [°] | free at most [°] | least |\n"
+          "| --- | --- | --- | --- | --- | --- |")  # fmt: skip
+    for name in ("humanoid", "human"):
+        body = plane_of(load_robot(name))
+        for step, speed in STEPS:
+            flexion, free, least = flat_soles(body, step, speed)
+            print(f"| {name} | {step:g} | {speed:g} | {np.degrees(flexion):.0f} "
+                  f"| {np.degrees(free):.0f} | {least:.2f} |")  # fmt: skip
 
 
 if __name__ == "__main__":

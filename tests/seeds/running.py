@@ -9,11 +9,12 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from .rows import ROOT, Row, Run
 
-WIDE = {"COLUMNS": "200", "TERM": "dumb", "PYTHONPATH": str(ROOT)}
+WIDE = {"COLUMNS": "200", "TERM": "dumb", "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'src'}"}
 
 
 def prepare(folder: Path) -> Path:
@@ -74,6 +75,9 @@ def faults(run: Run, code: int, output: str) -> Iterator[str]:
 
 
 def runs_of(rows: Iterable[Row], *, daily: bool = False) -> list[Run]:
-    """Commands of rows in order, each once."""
-    runs = {run.run: run for row in rows for run in row.runs if run.daily or not daily}
+    """Commands of rows in order, each once, with the figures of all rows that have it."""
+    runs: dict[str, Run] = {}
+    for run in (run for row in rows for run in row.runs if run.daily or not daily):
+        before = runs.get(run.run, run)
+        runs[run.run] = replace(run, figures=tuple(dict.fromkeys(before.figures + run.figures)))
     return list(runs.values())
