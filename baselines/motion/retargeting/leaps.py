@@ -21,7 +21,7 @@ from .tracks import Tracks
 
 FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
 TOGETHER = 0.15  # [s] between two feet that leave the ground, or land, in one jump
-NO_FLIGHT = 0.9  # [s] without a foot on the ground: nobody flies so long
+NO_FLIGHT = 0.9  # [s] without a foot on the ground: longer than a jump
 #: seconds of flight, and shares of the clip's way and turn, that are tried
 FLIGHTS = (0.34, 0.32, 0.28, 0.25, 0.22, 0.2, 0.15, 0.1)
 WAYS = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15, 0.0)

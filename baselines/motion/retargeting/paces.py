@@ -86,7 +86,7 @@ def find_paces(clip: Clip) -> list[ClipStep]:
     found.sort(key=lambda pace: pace.land)
     if not found:
         up = "its feet move, but take no step"
-        for foot in np.flatnonzero(~planted[-1]):
+        for foot in np.flatnonzero(~planted[-1]).tolist():
             last = float(np.flatnonzero(planted[:, foot])[-1] * clip.dt)
             up = f"its {SIDES[foot]} foot lifts off at {last:.2f} s and does not land again"
         raise ConfigError(up, source=clip.name, field="feet")
