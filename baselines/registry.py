@@ -218,7 +218,8 @@ def _build(data: dict[str, object], source: str) -> ControllerConfig:
     data = on_base(data, bases, source, parts=("qp", "step_qp"))
     data = {name: value for name, value in data.items() if name not in not_given}
     kind = data.get("kind", "momentum-qp")
-    if not isinstance(kind, str) or kind not in (known := kinds()):
+    known = kinds()
+    if not isinstance(kind, str) or kind not in known:
         raise ConfigError(
             f"no such kind of controller: {shown(kind)}", source=source, field="kind", choices=known
         )

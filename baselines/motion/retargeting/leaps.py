@@ -21,6 +21,7 @@ from .tracks import Tracks
 
 FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
 TOGETHER = 0.15  # [s] between two feet that leave the ground, or land, in one jump
+NO_FLIGHT = 0.9  # [s] without a foot on the ground: longer than a jump
 #: seconds of flight, and shares of the clip's way and turn, that are tried
 FLIGHTS = (0.34, 0.32, 0.28, 0.25, 0.22, 0.2, 0.15, 0.1)
 WAYS = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15, 0.0)
@@ -53,6 +54,10 @@ def find_leaps(clip: Clip) -> list[Leap]:
         b = last + 1
         if (b - a) * clip.dt <= FLIGHT:
             continue
+        if (b - a) * clip.dt > NO_FLIGHT:
+            raise ConfigError(f"for {(b - a) * clip.dt:.2f} s at {a * clip.dt:.2f} s no foot of it "
+                              "is found on the ground, longer than any jump", source=clip.name,
+                              field="contacts")  # fmt: skip
         around = round(TOGETHER / clip.dt)
         before, after = planted[max(a - around, 0) : a], planted[b : b + around]
         if a == 0 or b == len(planted):

@@ -85,7 +85,11 @@ def find_paces(clip: Clip) -> list[ClipStep]:
             found.append(ClipStep(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
     found.sort(key=lambda pace: pace.land)
     if not found:
-        raise ConfigError("its feet move, but take no step", source=clip.name, field="feet")
+        up = "its feet move, but take no step"
+        for foot in np.flatnonzero(~planted[-1]).tolist():
+            last = float(np.flatnonzero(planted[:, foot])[-1] * clip.dt)
+            up = f"its {SIDES[foot]} foot lifts off at {last:.2f} s and does not land again"
+        raise ConfigError(up, source=clip.name, field="feet")
     return _in_turn(found)
 
 

@@ -12,6 +12,7 @@ from scipy.ndimage import minimum_filter1d
 from poise.baselines.balance.references.robot_clip import RATE, RobotClip, reference_from
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.contacts import measure_contacts
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.baselines.motion.retargeting.limbs import find_limbs
@@ -33,12 +34,12 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .in_step import in_step
-from .walked import Walked, find_commands
+from .walked import Walked, find_commands, walked_clip
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
 COMES_DOWN, CLIMB = 1.5, 0.2  # [s] in which a foot is down; [legs] that the ground rises at least
+KNEE = 0.12  # [legs] over the floor: a knee that is lower is on the ground
 CROSSOVER = 2.0  # f [Hz], what is asked of the body faster than this is smoothed away
 
 
@@ -59,7 +60,8 @@ class RetargetedClip(NamedTuple):
             needed.
         asked: commanded speed over the clip's at that tempo, since the walker is slower.
         flight: share of the time that the clip is in flight.
-        bound, sunk, spread: as of `Retargeted`.
+        bound: why it is slower, as of `Retargeted`; of what walks why it takes other steps.
+        sunk, spread: as of `Retargeted`.
     """
 
     clip: RobotClip
@@ -114,7 +116,7 @@ def retarget_clip(
             reason = (f"{made.bound}; with {made.stride:.2f} of its way at {made.tempo:.2f} of its "
                       "tempo it can be done (--steps)")  # fmt: skip
         except ConfigError as error:
-            reason = _climb(clip) or error.message
+            reason = _climb(clip) or _kneels(clip) or error.message
             if asked or error.field not in UNPERFORMED:
                 raise
     free = retarget_freely(clip, robot, smooth=smooth)
@@ -123,19 +125,18 @@ def retarget_clip(
     if not kinematic:
         try:
             found = find_commands(clip, robot, free.scale, ENOUGH)
-            walks = replace(free.clip, commands=found.commands, dt=free.clip.dt / found.tempo)
-            walks = in_step(walks, robot)
+            walks = walked_clip(free.clip, found, robot)
             reference_from(walks, robot, clip.name)
             seen, walked = walks, found
         except ConfigError as error:
-            if error.field == "speed":
+            if error.field == "speed" and not _kneels(clip):
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
-    scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
-    made = _stepped(free._replace(clip=seen), scene)
+    scene = _scene(robot, find_limbs(robot), free.clip.qpos, 0.0, free.clip.planted)
+    made = _stepped(free, scene)._replace(clip=seen)
     if walked is None:
         return made._replace(tempo=1.0)
     return made._replace(tempo=walked.tempo, walker=walked.walker, stride=walked.way,
-                         asked=walked.asked)  # fmt: skip
+                         asked=walked.asked, bound=walked.bound)  # fmt: skip
 
 
 def _climb(clip: Clip) -> str:
@@ -148,6 +149,17 @@ def _climb(clip: Clip) -> str:
     if rise < CLIMB * clip.skeleton.leg_length:
         return ""
     return f"its feet go up or down by {rise:.2f} m, and it can be performed on level ground alone"
+
+
+def _kneels(clip: Clip) -> str:
+    """What says that a knee of a clip is on the ground; empty where none is."""
+    places, down = clip.places(), KNEE * clip.skeleton.leg_length + measure_contacts(clip).floor
+    for side in SIDES:
+        low = np.flatnonzero(places[:, clip.skeleton.joint(f"knee_{side}", clip.name), 2] < down)
+        if low.size:
+            return (f"its {side} knee is on the ground at {low[0] * clip.dt:.2f} s: robots stand "
+                    "on their feet alone")  # fmt: skip
+    return ""
 
 
 def performable(

@@ -1,5 +1,6 @@
 """Commands of a step planner by which a robot walks and turns as a clip does."""
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -7,8 +8,9 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
+from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.balance.references.reference_motion import MOST_COMMANDS, faster
-from poise.baselines.balance.references.robot_clip import RATE
+from poise.baselines.balance.references.robot_clip import RATE, RobotClip
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import (
     grounded,
@@ -16,42 +18,72 @@ from poise.baselines.motion.clips.contacts import (
     measure_contacts,
     over_ground,
 )
+from poise.baselines.motion.retargeting.leaps import STANDS
 from poise.configs.errors import ConfigError
+from poise.envs.compiled.maths.runs import runs_of
 from poise.envs.robots.robot import Robot
 
-from .in_step import BOTH
+from .in_step import BOTH, in_step
+from .own_steps import (
+    ASIDE_STEP,
+    BACK_STEP,
+    BANK,
+    BEND,
+    MOST_TURN,
+    QUICKEST,
+    SLOWEST,
+    TOGETHER,
+    check_changes,
+    out_of_turn,
+    own_steps,
+)
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
-TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 STRIDE = 0.6  # [s] without a foot on the ground: longer is no run
 LONGEST = 0.72  # [h] of a step: further, robots fall
-SHARE = 0.7  # of a clip's way times its tempo, from which its own steps are taken
-OWN, EARLY = 0.66, 0.02  # [h] of a step that lasts as the clip's; [s] by which soles touch early
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
 STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
 REACHES = 0.47  # [hω] that `walk-fast` reaches, whatever the command
 ASKED = 1.06  # largest commanded speed over the clip's: the policy is slower than commanded
 FAST_ROBOTS = ("humanoid",)  # for which the others are; others fall
-BANK, LEARNED_BANK = 0.07, 0.0875  # [g] of speed times turning rate, above which robots fall
+LEARNED_BANK = 0.0875  # [g] of speed times turning rate, above which robots fall
 ASKED_BANK = 0.091  # [g] commanded in curves at most: it goes slower than commanded
 ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, of the policy's training
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
-BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
-QUICKEST = 0.75  # [1/ω] of a swing; and what it lasts at most:
-SLOWEST = 3.0
 
 
 class Walked(NamedTuple):
-    """Commands (n, 5) in the clip's time, how many times as fast as the clip that is, the packaged
-    controller or policy that walks so, its commanded speed over that speed, as it is slower, and
-    the length of its steps over the clip's."""
+    """How a clip is walked.
+
+    Attributes:
+        commands: (n, 5) in the clip's time.
+        tempo: how many times as fast as the clip that is.
+        walker: the packaged controller or policy that walks so.
+        asked: its commanded speed over that speed, as it is slower.
+        way: the length of its steps over the clip's.
+        planted: (F, 2) the clip's stances at `RATE`, left and right, which its steps are judged by.
+        bound: why its steps are not the clip's; empty where they are.
+    """
 
     commands: np.ndarray
     tempo: float
     walker: str
     asked: float = 1.0
     way: float = 1.0
+    planted: np.ndarray = np.empty((0, 2), dtype=bool)
+    bound: str = ""
+
+
+def walked_clip(clip: RobotClip, found: Walked, robot: Robot) -> RobotClip:
+    """A robot's clip in the clip's time, walked by what is found for it, in step.
+
+    Its stances are the clip's: soles that turn on the ground have landed.
+    """
+    left = int(np.argmax(foot_signs(robot)))
+    planted = found.planted[:, [0, 1] if left == 0 else [1, 0]]
+    return in_step(replace(clip, commands=found.commands, dt=clip.dt / found.tempo,
+                           planted=planted), robot)  # fmt: skip
 
 
 def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) -> Walked:
@@ -74,6 +106,7 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
         raise ConfigError("its feet move, but take no two steps", source=clip.name, field="feet")
     period = float(np.median(np.diff(lands))) if len(lands) > 2 else float(np.diff(lands)[0])
     walk = over_ground(clip).faced().resampled(RATE)
+    stances = planted[np.abs(walk.times[:, None] - clip.times).argmin(axis=1)]
     size = 2 * max(round(period / RATE), 1) + 1
     facing = _mean(np.unwrap(walk.facing()), size)
     velocity, turn = np.gradient(scale * walk.root[:, :2], RATE, axis=0), np.gradient(facing, RATE)
@@ -98,7 +131,8 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     elif fast:
         fastest = REACHES * h * omega
         tempo = min(tempo, fastest / max(float(speed.max()), 1e-9))
-    tempo = min(tempo, np.sqrt(most / max(bend, 1e-9)))
+    spin = MOST_TURN * omega / (QUICKEST + BOTH)
+    tempo = min(tempo, np.sqrt(most / max(bend, 1e-9)), spin / max(float(np.abs(turn).max()), 1e-9))
     if tempo < least:
         bound = tempo * speed.max()
         in_curves = " in curves like its own" if bound < 0.999 * fastest else ""
@@ -108,18 +142,22 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     each = _steps(lands, period, walk.duration)
     rows = np.array([[start, *(rate[_frames(start, end)].mean() for rate in (ahead, left, turn)),
                       own] for start, end, own in each])  # fmt: skip
-    if own := _own_steps(rows, robot, max(least, SHARE)):
-        return own
+    own = own_steps(rows, robot, least)
+    bound = own.bound or out_of_turn(planted, clip.dt)
+    check_changes(faster(rows, tempo) if own.bound else own.commands, robot, clip.name)
+    if not own.bound:
+        return Walked(own.commands, own.tempo, WALK, 1.0, own.way, stances, bound)
     commands = faster(rows, tempo)
     if learned:
         commands[:, 4] = 0.0  # it was trained at its gait's own
         bent = float(np.abs(commands[:, 1] * commands[:, 3]).max())
         asked = max(min(ASKED, ASKED_BANK * robot.units.gravity / max(bent, 1e-9)), 1.0)
         commands[:, 1:3] *= asked
-        return Walked(commands, tempo, LEARNED, asked)
+        return Walked(commands, tempo, LEARNED, asked, 1.0, stances, bound)
     commands[:, 4] = _swings(commands, h, omega)
     quick = np.hypot(commands[:, 1], commands[:, 2]).max() > STEADY * h * omega
-    return Walked(commands, tempo, WALK_FAST if quick else WALK)
+    walker = WALK_FAST if quick else WALK
+    return Walked(commands, tempo, walker, planted=stances, bound=bound)
 
 
 def _steps(lands: np.ndarray, period: float, duration: float) -> list[tuple[float, float, float]]:
@@ -142,32 +180,13 @@ def _frames(start: float, end: float) -> slice:
     return slice(first, max(round(end / RATE), first + 1))
 
 
-def _own_steps(rows: np.ndarray, robot: Robot, least: float) -> Walked | None:
-    """A walk by `walk` whose steps last as the clip's, shorter and slower as need be; None where
-    it would go less than `least` of the clip's way times its tempo."""
-    h, omega = robot.height_com, robot.omega
-    going, turning = np.hypot(rows[:, 1], rows[:, 2]), np.abs(rows[:, 3])
-    times, bend = rows[:, 4], float((going * turning).max())
-    if (turning * times).max() > MOST_TURN:
-        return None
-    way = min(OWN * h / max(float((going * times).max()), 1e-9), 1.0)
-    tempo = min(1.0, BRISK * h * omega / max(way * float(going.max()), 1e-9),
-                BEND * h * omega / max(way * float((going * turning * times).max()), 1e-9),
-                np.sqrt(BANK * robot.units.gravity / max(way * bend, 1e-9)),
-                float(times.min()) * omega / (QUICKEST + BOTH))  # fmt: skip
-    slowest = (SLOWEST + BOTH) / omega
-    if way * tempo < least or (times / tempo).max() > slowest:
-        return None
-    commands = faster(rows * [1.0, way, way, 1.0, 1.0], tempo)
-    commands[:, 4] -= BOTH / omega - EARLY
-    return Walked(commands, float(tempo), WALK, way=way)
-
-
 def _swings(commands: np.ndarray, h: float, omega: float) -> np.ndarray:
     """(n,) the clip's times of a swing [s], quicker where steps would be too long or bend much."""
-    going = np.hypot(commands[:, 1], commands[:, 2])
+    going, aside = np.hypot(commands[:, 1], commands[:, 2]), np.abs(commands[:, 2])
     turning = np.maximum(np.abs(commands[:, 3]), 1e-9)
-    limits = [LONGEST * h / np.maximum(going, 1e-9), MOST_TURN / turning,
+    limits = [ASIDE_STEP * h / np.maximum(aside, 1e-9),
+              BACK_STEP * h / np.maximum(-commands[:, 1], 1e-9),
+              LONGEST * h / np.maximum(going, 1e-9), MOST_TURN / turning,
               BEND * h * omega / np.maximum(going * turning, 1e-9),
               np.where(going > BRISK * h * omega, QUICK / omega, np.inf)]  # fmt: skip
     swing = np.minimum(commands[:, 4], np.min(limits, axis=0)) - BOTH / omega
@@ -180,6 +199,14 @@ def _run(clip: Clip, planted: np.ndarray) -> str:
     if time <= FLIGHT:
         return ""
     says = f"both feet are off the ground for {time:.2f} s at {first * clip.dt:.2f} s"
+    around, hops = round(TOGETHER / clip.dt), runs_of(np.asarray(~planted.any(axis=1))).tolist()
+    both = [(a, b) for a, b in hops if a and (b - a) * clip.dt > FLIGHT
+            and planted[b : b + around].any(axis=0).all()]  # fmt: skip
+    if len(both) > 1:
+        a, b = both[0]
+        raise ConfigError(f"it hops {len(both)} times onto both feet, first for "
+                          f"{(b - a) * clip.dt:.2f} s at {a * clip.dt:.2f} s: jumps are performed "
+                          f"{STANDS} s apart", source=clip.name, field="speed")  # fmt: skip
     before = planted[max(first - round(TOGETHER / clip.dt), 0) : first]
     if time > STRIDE or before.any(axis=0).all():
         raise ConfigError(says, source=clip.name, field="contacts")

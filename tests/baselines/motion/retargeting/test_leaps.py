@@ -42,6 +42,8 @@ def test_jumps_are_found_and_runs_are_told_apart() -> None:
     late = replace(clip, root=clip.root[60:], rotations=clip.rotations[60:])
     with pytest.raises(ConfigError, match="begins or ends in flight"):
         find_leaps(late)
+    with pytest.raises(ConfigError, match=r"for 1\.\d\d s at 2\.\d\d s no foot of it is found"):
+        find_leaps(clip.at_speed(0.4))
 
 
 def test_jumps_too_soon_after_each_other_are_slower() -> None:

@@ -89,6 +89,16 @@ def test_a_flight_of_less_than_a_tenth_of_a_second_is_stepped(
         find_paces(clip)
 
 
+def test_a_foot_that_stays_up_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = make("backwards")[0]
+    contacts = measure_contacts(clip)
+    planted = np.ones_like(contacts.planted)
+    planted[round(1.5 / clip.dt) :, 1] = False
+    monkeypatch.setattr(paces, "measure_contacts", lambda _: contacts._replace(planted=planted))
+    with pytest.raises(ConfigError, match=r"its right foot lifts off at 1\.49 s and does not land"):
+        find_paces(clip)
+
+
 def test_flights_and_whole_turns_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"feet: both feet are off the ground for 0.48 s at 1.00"):
         find_paces(make("jump")[0])

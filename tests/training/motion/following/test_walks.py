@@ -10,16 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from poise.baselines.balance.references.reference_motion import command_options
 from poise.baselines.balance.references.robot_clip import (
     RobotClip,
     read_robot_clip,
     reference_from,
     write_robot_clip,
 )
+from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.baselines.motion.clips.skeleton import SIDES
 from poise.baselines.motion.retargeting.retarget import retarget_freely
-from poise.baselines.motion.space_time.in_step import in_step
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
-from poise.baselines.motion.space_time.walked import find_commands
+from poise.baselines.motion.space_time.walked import find_commands, walked_clip
+from poise.baselines.registry import load_controller
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.errors import ConfigError
 from poise.training.motion.following.follow import follow
 from tests.support.captures import CAPTURES, make
@@ -43,7 +47,7 @@ def walking(name: str) -> RobotClip:
 @pytest.mark.parametrize("name", SPEEDS)
 def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
     scale, robot = 0.9, robot_named(HUMANOID)
-    commands, tempo, _, _, way = find_commands(make(name)[0], robot, scale)
+    commands, tempo, _, _, way, *_ = find_commands(make(name)[0], robot, scale)
     ahead, left, turn = SPEEDS[name]
     told = np.median(commands[:, 1:4], axis=0)
     assert told == pytest.approx([way * scale * ahead, way * scale * left, turn], abs=0.06)
@@ -63,10 +67,39 @@ def test_steps_are_the_clip_s_where_legs_can() -> None:
     lasts = np.diff(found.commands[1:, 0])
     assert found.commands[1:-1, 4] + 0.037 - 0.02 == pytest.approx(lasts, abs=0.002)
     length = found.commands[1:-1, 1] * lasts
-    assert length.max() == pytest.approx(0.66 * robot.height_com, rel=0.03)
-    walks = in_step(replace(free.clip, commands=found.commands), robot)
+    assert length.max() == pytest.approx(0.6 * robot.height_com, rel=0.03)
+    walks = walked_clip(free.clip, found, robot)
     (trial,) = follow(reference_from(walks, robot, "walk"), found.walker, starts=1)
     assert not trial.fallen and trial.footsteps_kept >= 0.9 and abs(trial.footstep_delay) < 0.1
+
+
+def test_footsteps_are_the_clip_s_though_soles_turn_on_the_ground() -> None:
+    """A robot's soles that turn do not rest: they would have landed later, or twice."""
+    clip, robot = make("walk")[0], robot_named(HUMANOID)
+    free = retarget_freely(clip, robot)
+    assert free.clip.planted is not None
+    turning = replace(free.clip, planted=np.zeros_like(free.clip.planted))
+    found = find_commands(clip, robot, free.scale)
+    walks = walked_clip(turning, found, robot)
+    assert walks.planted is not None
+    held = len(walks.qpos) - len(free.clip.qpos)
+    lands = np.sort(np.argwhere(np.diff(walks.planted[held:].astype(int), axis=0) > 0)[:, 0])
+    contacts = measure_contacts(clip).planted
+    wanted = np.sort(np.argwhere(np.diff(contacts.astype(int), axis=0) > 0)[:, 0]) * clip.dt
+    assert lands * walks.dt * found.tempo == pytest.approx(wanted, abs=0.03)
+
+
+def test_steps_to_a_side_are_within_the_planner_s_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is imported can be followed: a capture of others went 0.48 m to the side in a step."""
+    capture = CAPTURES["walk"]._replace(
+        path=lambda t: np.column_stack([0.1 * t, 0.9 * t, np.zeros(len(t))])
+    )
+    monkeypatch.setitem(CAPTURES, "aside", capture)
+    robot = robot_named(HUMANOID)
+    walker = load_controller("walk", robot)
+    found = find_commands(make("aside")[0], robot, 0.9)
+    for option in command_options(found.commands):
+        walker.check_command(GaitCommand(**{k: v for k, v in option.items() if k != "start"}))
 
 
 @pytest.mark.parametrize("name", ["circle", "run-curve"])
@@ -74,7 +107,7 @@ def test_a_curve_is_told_as_one_from_begin_to_end(name: str) -> None:
     """A course that goes on straight beyond its ends leads aside there, and chords are short."""
     robot = robot_named(HUMANOID)
     ahead, turn = {"circle": (0.7, 0.95), "run-curve": (2.4, 0.8)}[name]
-    commands, tempo, _, asked, _ = find_commands(make(name)[0], robot, 0.9)
+    commands, tempo, _, asked, *_ = find_commands(make(name)[0], robot, 0.9)
     assert commands[:, 1] == pytest.approx(asked * tempo * 0.9 * ahead, rel=0.01)
     assert commands[:, 2] == pytest.approx(0.0, abs=0.01)
     assert commands[:, 3] == pytest.approx(tempo * turn, rel=0.01)
@@ -85,6 +118,22 @@ def test_what_goes_up_is_refused_for_that() -> None:
     stairs = replace(clip, root=clip.root + 0.25 * clip.root[:, :1] * [0.0, 0.0, 1.0])
     made = retarget_clip(stairs, robot_named(HUMANOID))
     assert re.match(r"its feet go up or down by 1\.\d\d m", made.clip.about.unperformed)
+
+
+def test_what_kneels_is_refused_for_that() -> None:
+    """On one frame of `sit`: shanks back, and hips as much lower."""
+    clip = make("sit")[0]
+    late, knees = clip.times > 2.5, [clip.skeleton.joint(f"knee_{side}") for side in SIDES]
+    rotations, root = (
+        np.repeat(clip.rotations[:1], len(clip), 0),
+        np.repeat(clip.root[:1], len(clip), 0),
+    )
+    half = np.arctan2(*rotations[0, knees[0], [2, 0]]) + np.radians(50.0)
+    for knee in knees:
+        rotations[late, knee] = [np.cos(half), 0.0, np.sin(half), 0.0]
+    root[late, 2] -= clip.places()[0, knees[0], 2]
+    made = retarget_clip(replace(clip, rotations=rotations, root=root), robot_named(HUMANOID))
+    assert made.clip.about.unperformed.startswith("its left knee is on the ground at 2.5")
 
 
 def test_the_way_of_a_clip_that_is_walked_is_what_the_planner_is_told(
@@ -101,7 +150,7 @@ def test_the_way_of_a_clip_that_is_walked_is_what_the_planner_is_told(
 def test_what_is_too_fast_is_slower_and_says_so() -> None:
     """By the controller that reaches it; the policy is told more than it reaches."""
     robot, h_omega = robot_named(HUMANOID), 2.779
-    commands, tempo, walker, asked, _ = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
+    commands, tempo, walker, asked, *_ = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
     assert 0.7 < tempo < 0.9 and walker == "residual-walk-fast" and 1.05 < asked <= 1.06
     assert commands[:, 1] == pytest.approx(asked * tempo * 1.9 * 1.2 * 0.9, abs=0.06)
     assert commands[:, 1].max() <= 1.06 * 0.585 * h_omega + 1e-3
@@ -120,7 +169,7 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
 def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
     """At the steps of its own gait; other robots are slower instead."""
     robot, clip = robot_named(HUMANOID), make("run-curve")[0]
-    commands, tempo, walker, asked, _ = find_commands(clip, robot, 0.9)
+    commands, tempo, walker, asked, *_ = find_commands(clip, robot, 0.9)
     assert walker == "residual-walk-fast" and 0.7 <= tempo < 0.75
     assert (commands[:, 4] == 0.0).all() and 1.5 < commands[:, 1].max() / asked < 1.6
     assert asked > 1.03 and (commands[:, 1] * commands[:, 3]).max() <= 0.0911 * 9.81
@@ -130,6 +179,25 @@ def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
     assert made.walker == walker and made.clip.commands is not None
     (trial,) = follow(reference_from(made.clip, robot, "run-curve"), walker, starts=1)
     assert not trial.fallen and 0.8 < trial.walked < 1.1 and 0.9 < trial.turned < 1.2
+
+
+def test_what_hops_or_changes_its_speed_too_soon_is_no_walk(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot, stances = robot_named(HUMANOID), [(0.9 * k, 0.9 * k + 0.75) for k in range(-1, 6)]
+    hops = CAPTURES["backwards"]._replace(stances=(stances, stances))
+    monkeypatch.setitem(CAPTURES, "hops", hops)
+    with pytest.raises(ConfigError, match=r"hops \d times onto both feet, first for 0\.1\d s"):
+        find_commands(make("hops")[0], robot, 0.9)
+    back = CAPTURES["walk"]._replace(
+        path=lambda t: np.column_stack([-1.2 * np.abs(t - 2.0), 0.0 * t, 0.0 * t])
+    )
+    monkeypatch.setitem(CAPTURES, "back", back)
+    with pytest.raises(
+        ConfigError, match=r"its speed changes by \d\.\d\d m/s at \d\.\d\d s"
+    ) as told:
+        find_commands(make("back")[0], robot, 0.9)
+    assert told.value.field == "speed"
 
 
 def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
