@@ -141,10 +141,14 @@ class Terms(dict[str, TermKind]):
             meaning: what they are.
             image: what they are to a mirror, see `Term`.
             default: whether observations have the term if no list is given.
+
+        Raises ValueError for a name that another term has.
         """
 
         def decorate(function: F) -> F:
             kernel, name = compiled(function), function.__name__
+            if name in self:
+                raise ValueError(f"a term {name} exists already")
             self[name] = TermKind(name, entries, unit, meaning, image, default, kernel, self.view)
             return kernel
 

@@ -319,6 +319,15 @@ def test_a_term_is_one_function():
     assert mirror_terms([term], {}).sign.tolist() == [1.0, 1.0]
 
 
+def test_a_term_cannot_take_the_name_of_another():
+    terms = Terms(TERMS)
+    with pytest.raises(ValueError, match="joint_pos"):
+
+        @terms.add(("n",), "1", "another", "number")
+        def joint_pos(v: View):
+            v.out[0] = 0.0
+
+
 def test_the_push_that_acts_is_observed():
     """Its force in the heading frame over the weight, while it acts; a half-sine's at its phase."""
     env = TorqueBalanceEnv(robot(), pushes=None, observation={"terms": ["push"]})
