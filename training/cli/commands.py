@@ -335,7 +335,7 @@ def robot(
 
     loaded, written = load_and_write(name)
     if written is not None:
-        print(f"{written}: a guessed description, to correct and to name from now on")
+        print(f"{written}: a guessed description: edit it, and pass it to --robot")
     check = check_robot(loaded)
     print_robot_check(check, terminal(stderr=json))
     if json:
