@@ -35,7 +35,7 @@ class Calibration:
             0: never.
         start: s of ahead, left [m/s] and turn [rad/s].
         correction: k [1/s] of the integral of the velocity's error, see `correction.py`; 0: none.
-        admittance: κ of how far it gives way to a push, see `admittance.py`; 0: not at all.
+        admittance: how far it gives way to a push, κ of `admittance.py`; 0: not at all.
     """
 
     ahead: Knots = ()
