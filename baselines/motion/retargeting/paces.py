@@ -76,7 +76,8 @@ def find_paces(clip: Clip) -> list[ClipStep]:
     places, found = clip.places(), []
     for foot, side in enumerate(SIDES):
         heights = places[:, clip.skeleton.joint(f"ankle_{side}", clip.name), 2]
-        stances, low = stances_of(planted[:, foot]), float(heights[planted[:, foot]].mean())
+        stances = stances_of(planted[:, foot])
+        low = float(heights[planted[:, foot]].mean()) if len(stances) else 0.0
         for k, (a, b) in enumerate(stances):
             if a == 0 or (len(planted) - a) * clip.dt < BOTH:  # the clip shows no step's end
                 continue
@@ -85,11 +86,14 @@ def find_paces(clip: Clip) -> list[ClipStep]:
             found.append(ClipStep(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
     found.sort(key=lambda pace: pace.land)
     if not found:
-        up = "its feet move, but take no step"
+        why = "its feet move, but take no step"
         for foot in np.flatnonzero(~planted[-1]).tolist():
-            last = float(np.flatnonzero(planted[:, foot])[-1] * clip.dt)
-            up = f"its {SIDES[foot]} foot lifts off at {last:.2f} s and does not land again"
-        raise ConfigError(up, source=clip.name, field="feet")
+            down = np.flatnonzero(planted[:, foot])
+            why = f"its {SIDES[foot]} foot does not land"
+            if down.size:
+                why = (f"its {SIDES[foot]} foot lifts off at {down[-1] * clip.dt:.2f} s and does "
+                       "not land again")  # fmt: skip
+        raise ConfigError(why, source=clip.name, field="feet")
     return _in_turn(found)
 
 

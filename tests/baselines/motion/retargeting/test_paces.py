@@ -99,6 +99,16 @@ def test_a_foot_that_stays_up_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         find_paces(clip)
 
 
+def test_a_foot_that_never_stands_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = make("backwards")[0]
+    contacts = measure_contacts(clip)
+    planted = np.ones_like(contacts.planted)
+    planted[:, 1] = False
+    monkeypatch.setattr(paces, "measure_contacts", lambda _: contacts._replace(planted=planted))
+    with pytest.raises(ConfigError, match="its right foot does not land"):
+        find_paces(clip)
+
+
 def test_flights_and_whole_turns_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"feet: both feet are off the ground for 0.48 s at 1.00"):
         find_paces(make("jump")[0])
