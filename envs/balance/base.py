@@ -38,6 +38,7 @@ from .episode import (
     begin_episode,
 )
 from .mdp.docstrings import filled
+from .mdp.interleaving import interleave, interleaving, kept_frames
 from .mdp.observation import Term, Terms, View, frames, mirror_terms, observer, scales
 from .mdp.reward import REWARD_TERMS, RewardView, rewards
 from .mdp.termination import episode_limits
@@ -104,6 +105,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         #: entries of the policy's observation; the others are privileged
         self.seen = sum(term.size for term in seen)
         sizes = {"na": len(self.action_names), "no": size, "terms": len(REWARD_TERMS)}
+        stride = chosen.history_stride
+        frame = sum(term.size for term in self._newest)
+        sizes["past"] = frame * kept_frames(chosen.history, stride) if stride > 1 else 0
         self.episode = EpisodeArrays.allocate(
             sizes | self.simulation.sizes, metrics=Metrics.allocate()
         )
@@ -230,7 +234,10 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             e = self.episode
             seen, true = e.observation[: self.seen], e.observation[self.seen :]
             steps, estimated = e.memory_of("steps"), partial(self._view, self.state_source)
-            calls = observer(self._newest, seen, steps, estimated)
+            stride = self.config.observation.history_stride
+            calls = observer(self._newest, e.past if stride > 1 else seen, steps, estimated)
+            if stride > 1:
+                calls += [(interleave, interleaving(self._newest, e.past, seen, stride))]
             if self._privileged:
                 known = partial(self._view, self.simulation)
                 calls += observer(self._privileged, true, steps, known)

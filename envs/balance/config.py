@@ -37,6 +37,8 @@ class ObservationConfig:
         extra: Terms of the observation that come after those.
         history: Policy steps that the observation shows, all terms of a step side by side, the
             oldest first.
+        history_stride: How many times the policy runs in the `policy_period` that it was trained
+            with; the frames of the observation are that period apart, see `Interleaving`.
         privileged: Terms of this step that come last, of the true robot in its true state: for a
             critic that observes more than the policy [Pinto18].
     """
@@ -44,6 +46,7 @@ class ObservationConfig:
     terms: tuple[str, ...] | None = None
     extra: tuple[str, ...] = ()
     history: int = field(default=1, metadata={"min": 1, "max": 100, "omit": "default"})
+    history_stride: int = field(default=1, metadata={"min": 1, "max": 100, "omit": "default"})
     privileged: tuple[str, ...] = field(default=(), metadata=OMIT)
 
 

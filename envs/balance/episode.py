@@ -51,6 +51,7 @@ class EpisodeArrays(Block):
     action: Annotated[np.ndarray, "na"]
     last_action: Annotated[np.ndarray, "na"]
     observation: Annotated[np.ndarray, "no"]
+    past: Annotated[np.ndarray, "past"]  # frames of an observation with a stride, else empty
     reward: Mutable[float]  # of the last policy step
     reward_terms: Annotated[np.ndarray, "terms"]  # weighted; their sum is the reward
     metrics: Metrics

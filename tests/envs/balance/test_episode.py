@@ -21,7 +21,7 @@ from tests.support.shared import generic_state, robot
 
 def new_episode(actions, nc=2):
     """An empty record."""
-    sizes = {"na": actions, "no": 1, "terms": len(REWARD_TERMS), "nc": nc}
+    sizes = {"na": actions, "no": 1, "terms": len(REWARD_TERMS), "nc": nc, "past": 0}
     return EpisodeArrays.allocate(sizes | {"nu": robot().model.nu}, metrics=Metrics.allocate())
 
 
