@@ -330,12 +330,13 @@ def robot(
         check_out_file(picture, "picture")
         choose_gl_backend()
     from poise.training.deploy.robot_check.check import check_robot
-    from poise.training.deploy.robot_check.tables import print_robot_check
+    from poise.training.deploy.robot_check.tables import print_robot_check, summary
     from poise.training.deploy.robot_check.written import load_and_write
 
     loaded, written = load_and_write(name)
     if written is not None:
         print(f"{written}: a guessed description: edit it, and pass it to --robot")
+    terminal(stderr=True).print(summary(loaded), markup=False, highlight=False)
     check = check_robot(loaded)
     print_robot_check(check, terminal(stderr=json))
     if json:

@@ -7,6 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from poise.envs.physics.legs import Leg
+from poise.envs.robots.robot import Robot
 from poise.training.running.tables import fact_table, text_table
 
 from .check import RobotCheck
@@ -16,6 +17,14 @@ from .standing.pushed import SHARE, Pushed
 from .standing.rest import CONTROLLER, Rest
 
 EVERY = 2  # of the directions, in the table
+
+
+def summary(robot: Robot) -> str:
+    """Return a line that needs no compiled code: what was read, and what follows."""
+    soles = ", ".join(sole.name for sole in robot.soles)
+    return (f"{robot.name}: {robot.mass:.2f} kg, {len(robot.joint_names)} joints, "
+            f"{len(robot.motor_names)} motors, soles {soles}; checked on both feet, on one, at "
+            "rest and pushed")  # fmt: skip
 
 
 def print_robot_check(check: RobotCheck, console: Console) -> None:

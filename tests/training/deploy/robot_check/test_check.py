@@ -20,7 +20,7 @@ from poise.envs.robots.robot import load_robot
 from poise.training.cli.entry import main
 from poise.training.deploy.robot_check import check as module
 from poise.training.deploy.robot_check.check import RobotCheck, check_robot
-from poise.training.deploy.robot_check.tables import print_robot_check
+from poise.training.deploy.robot_check.tables import print_robot_check, summary
 from poise.training.deploy.robot_check.uses import IN_PLACE, STEPPING, Uses
 from tests.support.small_biped import LEG, motors, write_biped
 from tests.support.small_urdf import INERTIAL, write_urdf
@@ -322,3 +322,11 @@ def test_motors_that_stand_but_hold_no_push_are_warned_of(
     console = Console(record=True, width=200)
     print_robot_check(weak, console)
     assert "pushed, 0.5 of the ankle limit" in console.export_text()
+
+
+def test_what_was_read_is_known_before_the_checks():
+    """One line of the description alone, the first that `poise robot` shows."""
+    known = load_robot("humanoid")
+    line = summary(known)
+    assert line.startswith(f"humanoid: {known.mass:.2f} kg, 21 joints, 21 motors")
+    assert all(sole.name in line for sole in known.soles)
