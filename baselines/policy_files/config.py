@@ -214,6 +214,9 @@ class PolicyFileConfig:
         phase_offsets: how far each leg is ahead of the clock, of its period.
         phase_runs: whether the clock runs always, or restarts when a velocity is commanded.
         policy_period: of the policy [s].
+        copies: how many copies of the policy take turns within a `policy_period`, each with
+            observations of its own; actions are less late so. None that remembers, or follows a
+            motion.
         hold: joints that the policy does not have are held in the standing posture, critically
             damped, with this natural frequency [rad/s].
         digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in,
@@ -256,6 +259,7 @@ class PolicyFileConfig:
     motion: MotionConfig | None = field(default=None, metadata={"omit": "default"})
     phase_offsets: tuple[float, ...] = _new((0.0, 0.5))
     phase_runs: Literal["always", "commanded"] = _new("always")
+    copies: int = _new(1, min=1, max=100)
 
     def __post_init__(self) -> None:
         for i, bounds in enumerate(self.action_clip):

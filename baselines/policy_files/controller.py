@@ -103,22 +103,33 @@ class PolicyFile(CompiledController):
         self.robot, self.config = robot, config
         self.arrays = robot_arrays(robot)
         self.period = self.arrays.timestep
-        every = whole_steps(config.policy_period, self.period, "policy_period", config.described_in)
+        copies, source = config.copies, config.described_in
+        steps = whole_steps(config.policy_period, self.period, "policy_period", source)
+        if steps % copies:
+            raise ConfigError(f"{copies} do not divide the {steps} physics steps of a policy step",
+                              source=source, field="copies")  # fmt: skip
         self.joints = joint_servos(robot, config)
-        self.observer = observer_of(robot, config, self.joints)
-        self.action = np.zeros(len(self.joints.moved))
+        #: one for each copy, with its last action
+        self._copies = [
+            (observer_of(robot, config, self.joints), np.zeros(len(self.joints.moved)))
+            for _ in range(copies)
+        ]
+        self.observer, self.action = self._copies[0]
         self._legs = 2.0 * np.pi * np.array(config.phase_offsets)
         self.orders = guarded_zeros(COMMAND_ENTRIES) if follows_commands(config) else None
         self._clock_start: float | None = None  # [s]; None: it stands
         self.network = load_network(Path(config.policy), config)
         self._check_sizes()
-        self.motion = self._motion(source=config.described_in)
+        self.motion = self._motion(source)
+        if copies > 1 and (self.motion is not None or self.network.memories()):
+            raise ConfigError("a policy that remembers or follows a motion has one copy",
+                              source=source, field="copies")  # fmt: skip
         nj = len(self.joints.target)
         limit = np.zeros(nj)
         limit[self.arrays.motor_dofs - 6] = self.arrays.torque_limit
         self._servos = PolicyServos(
             self.joints.stiffness.copy(), self.joints.damping.copy(), limit,
-            self.joints.target.copy(), guarded_zeros(nj), 0, every,
+            self.joints.target.copy(), guarded_zeros(nj), 0, steps // copies,
         )  # fmt: skip
         self._no_wrench = guarded_zeros(6)
         self._callback = Callback(self._ask)
@@ -165,8 +176,9 @@ class PolicyFile(CompiledController):
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial: action zero, no history."""
         self.network.reset()
-        self.observer.forget()
-        self.action[:] = 0.0
+        for observer, action in self._copies:
+            observer.forget()
+            action[:] = 0.0
         if self.orders is not None:
             self.orders[:] = 0.0
             self.orders[:3] = self.config.command
@@ -182,7 +194,8 @@ class PolicyFile(CompiledController):
     def _ask(self) -> None:
         """New targets from the policy."""
         assert self._state is not None
-        now = self._servos.ticks * self.period
+        now, step = self._servos.ticks * self.period, self._servos.ticks // self._servos.every
+        self.observer, self.action = self._copies[step % len(self._copies)]
         index, state = self.joints.index, self._state
         command = np.array(self.config.command) if self.orders is None else self.orders[:3]
         phase = self._phase(now, bool(np.any(command)))
@@ -191,7 +204,7 @@ class PolicyFile(CompiledController):
             command, phase, phase + self._legs, self.motion,
         )  # fmt: skip
         if self.motion is not None:
-            self.motion.update(state, self._servos.ticks // self._servos.every)
+            self.motion.update(state, step)
         observations = self.observer.observe(seen)
         if not all(np.all(np.isfinite(each)) for each in observations.values()):
             return  # the simulation diverged, which is a fall

@@ -17,7 +17,7 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.vector.batch import EnvBatch, replicate
 from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import Robot
-from tests.support.policies import linear, onnx_session, write_onnx, write_yaml
+from tests.support.policies import linear, onnx_session, write_onnx, write_recurrent, write_yaml
 from tests.support.rivals import network
 from tests.support.shared import robot as shared_robot
 
@@ -157,6 +157,55 @@ def test_compiled_and_from_python_it_is_the_same(robot: Robot, own: Path) -> Non
         env.reset(seed=3, options=SHAKY)
         seen.append(actions_here(env, 50))
     np.testing.assert_allclose(seen[0], seen[1], atol=1e-6)
+
+
+@pytest.mark.parametrize("copies", [1, 2, 5])
+def test_copies_take_turns(robot: Robot, own: Path, copies: int) -> None:
+    """Each observes frames a policy period apart, and its own last action; the next trial too."""
+    fields = {**described(robot), "copies": copies, "policy": str(own.with_name("policy.onnx"))}
+    env = make_env(robot, str(write_yaml(own.with_name(f"copies{copies}.yaml"), **fields)))
+    policy = env.controller
+    asked, act = [], policy.network.act
+
+    def watched(inputs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        answer = act(inputs)
+        asked.append((inputs[""].copy(), answer["action"].copy()))
+        return answer
+
+    policy.network.act = watched
+    n = len(policy.action)
+    older, newer = slice(15, 15 + n), slice(15 + n, 15 + 2 * n)
+    last = slice(15 + 3 * n, 15 + 4 * n)
+    for _ in range(2):
+        asked.clear()
+        env.reset(seed=3, options=SHAKY)
+        for _ in range(6):
+            env.step(np.zeros(4))
+        assert len(asked) == 6 * copies
+        for k in range(copies, len(asked)):
+            (seen, _), (before, action) = asked[k], asked[k - copies]
+            np.testing.assert_array_equal(seen[older], before[newer])
+            np.testing.assert_allclose(seen[last], action, atol=1e-6)
+        assert np.ptp([seen[newer] for seen, _ in asked], axis=0).max() > 1e-4
+
+
+@pytest.mark.parametrize(("copies", "part"), [(3, "do not divide"), (0, "at least 1")])
+def test_copies_share_the_steps_of_a_period(
+    robot: Robot, own: Path, copies: int, part: str
+) -> None:
+    fields = {**described(robot), "copies": copies, "policy": str(own.with_name("policy.onnx"))}
+    with pytest.raises(ConfigError, match=part):
+        make_env(robot, str(write_yaml(own.with_name("shared.yaml"), **fields)))
+
+
+def test_a_policy_that_remembers_has_one_copy(robot: Robot, tmp_path: Path) -> None:
+    n = len(robot.joint_names)
+    write_recurrent(tmp_path / "policy.onnx", n)
+    fields = {"kind": "policy-file", "policy": "policy.onnx", "joints": list(robot.joint_names),
+              "observations": [{"term": "dof_pos"}]}  # fmt: skip
+    make_env(robot, str(write_yaml(tmp_path / "one.yaml", **fields)))
+    with pytest.raises(ConfigError, match="copies: a policy that remembers"):
+        make_env(robot, str(write_yaml(tmp_path / "two.yaml", **fields, copies=2)))
 
 
 def test_a_trial_begins_without_memory(robot: Robot, own: Path) -> None:
