@@ -106,7 +106,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
         self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
         self._odometry, self._shift = guarded_zeros(3), guarded_zeros(3)
-        self._quick, self._way = guarded_zeros(2), guarded_zeros(2)
+        self._found, self._quick, self._way = guarded_zeros(3), guarded_zeros(2), guarded_zeros(2)
         super().__init__(robot, config, **arguments)
 
     def arguments(self) -> dict[str, Any]:
@@ -153,14 +153,15 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         correction = Correction(
             state=self.state_source.state_arrays,
             command=self._known_orders,
+            found=self._found,
             mean=self._odometry,
             shift=self._shift,
             part=part,
             rate=self.calibration.correction * period,
         )
         admittance = Admittance(
-            state=self.state_source.state_arrays,
             command=self._known_orders,
+            found=self._found,
             mean=self._odometry,
             quick=self._quick,
             way=self._way,

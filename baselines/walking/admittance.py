@@ -17,9 +17,6 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.physics.kinematics import StateArrays
-
-from .correction import odometry
 
 QUICK_TIME = 0.1  # [s] of w
 DEAD = 0.3  # [m/s]
@@ -30,9 +27,9 @@ MOST = 1.0  # [m/s]
 class Admittance(Block):
     """What `give_way` works on."""
 
-    state: StateArrays  # the one that the policy observes
     command: np.ndarray  # (8,) c, see `GaitCommand.array`
-    mean: Annotated[np.ndarray, 3]  # v̄ of a `Correction`
+    found: Annotated[np.ndarray, 3]  # by leg odometry, of a `Correction`, as v̄ is
+    mean: Annotated[np.ndarray, 3]  # v̄
     quick: Annotated[np.ndarray, 2]  # w ahead, left [m/s]
     way: Annotated[np.ndarray, 2]  # y
     part: float  # 1 − exp(−T / `QUICK_TIME`)
@@ -41,10 +38,9 @@ class Admittance(Block):
 
 @compiled
 def give_way(a: Admittance):
-    """Update w and y by a policy step, after v̄."""
-    ahead, left, _ = odometry(a.state)
-    a.quick[0] += a.part * (ahead - a.quick[0])
-    a.quick[1] += a.part * (left - a.quick[1])
+    """Update w and y by a policy step, after those of `correct_course`."""
+    for i in range(2):
+        a.quick[i] += a.part * (a.found[i] - a.quick[i])
     x, y = a.quick[0] - a.mean[0], a.quick[1] - a.mean[1]
     error_x, error_y = a.quick[0] - a.command[0], a.quick[1] - a.command[1]
     error = np.hypot(error_x, error_y)

@@ -31,6 +31,7 @@ class Correction(Block):
 
     state: StateArrays  # the one that the policy observes
     command: np.ndarray  # (8,) see `GaitCommand.array`
+    found: Annotated[np.ndarray, 3]  # v of this policy step ahead, left, and the turning rate
     mean: Annotated[np.ndarray, 3]  # v̄ ahead, left [m/s], of the turning rate [rad/s]
     shift: Annotated[np.ndarray, 3]  # δ
     part: float  # 1 − exp(−T / `MEAN_TIME`)
@@ -62,10 +63,10 @@ def odometry(s: StateArrays) -> tuple[float, float, float]:
 def correct_course(c: Correction):
     """Update v̄ and δ by a policy step. δ is zero while the command is to stand; that of the speeds
     is zero while it is to turn in place."""
-    found = odometry(c.state)
+    c.found[0], c.found[1], c.found[2] = odometry(c.state)
     walks = c.command[0] != 0.0 or c.command[1] != 0.0
     for a in range(3):
-        c.mean[a] += c.part * (found[a] - c.mean[a])
+        c.mean[a] += c.part * (c.found[a] - c.mean[a])
         shift = c.shift[a] + c.rate * (c.command[a] - c.mean[a])
         active = walks or (a == 2 and c.command[2] != 0.0)
         c.shift[a] = min(max(shift, -MOST), MOST) if active else 0.0

@@ -27,9 +27,10 @@ def moving(speed):
 
 
 def laws(state, part, gain=1.0, ahead=0.0):
-    command, mean = np.array([ahead, *np.zeros(7)]), np.zeros(3)
-    course = Correction(state, command, mean, np.zeros(3), 1.0 - np.exp(-PERIOD / MEAN_TIME), 0.0)
-    return course, Admittance(state, command, mean, np.zeros(2), np.zeros(2), part, gain)
+    command, found, mean = np.array([ahead, *np.zeros(7)]), np.zeros(3), np.zeros(3)
+    slow = 1.0 - np.exp(-PERIOD / MEAN_TIME)
+    course = Correction(state, command, found, mean, np.zeros(3), slow, 0.0)
+    return course, Admittance(command, found, mean, np.zeros(2), np.zeros(2), part, gain)
 
 
 def taken(course, admittance):

@@ -54,7 +54,7 @@ def test_it_does_not_need_the_velocity_of_the_root(seed):
 
 def correction(command, rate=0.01):
     state = moved(0, lambda *_: None)
-    return Correction(state, command, np.zeros(3), np.zeros(3), 0.04, rate)
+    return Correction(state, command, np.zeros(3), np.zeros(3), np.zeros(3), 0.04, rate)
 
 
 def test_the_error_of_the_mean_is_integrated_up_to_a_limit():
