@@ -108,14 +108,26 @@ def test_the_packaged_configuration_is_whole() -> None:
     assert not hidden & set(config.env.observation.terms or ())  # no sensor gives these
 
 
+def test_the_packaged_walker_runs_every_4_ms() -> None:
+    """Five times as often as it was trained; its export names the stride of its frames."""
+    policy = load_policy("velocity-g1")
+    env = policy.make_env()
+    said = metadata(policy, env)
+    assert (said["control_period"], said["observation_history_stride"]) == ("0.004", "5")
+    trained = train_config("velocity-g1").env
+    stride = env.config.observation.history_stride
+    assert env.config.policy_period * stride == pytest.approx(trained.policy_period)
+
+
 def test_the_packaged_walker_keeps_its_speed_with_a_delay():
     """0.8 m/s with 20 ms of delay, mean of the 4th to the 8th second; without it, 0.13 too fast."""
     policy = load_policy("velocity-g1")
     env = policy.make_env(duration=8.5, pushes=None, realism="late")
     observation, _ = env.reset(seed=3, options={"command": {"ahead": 0.8}})
     speeds = []
-    for _ in range(400):
+    count = round(8.0 / env.config.policy_period)
+    for _ in range(count):
         observation, _, terminated, _, info = env.step(policy.act(observation))
         speeds.append(info["velocity_error"][0])
     assert not terminated
-    assert abs(np.mean(speeds[200:])) < 0.03
+    assert abs(np.mean(speeds[count // 2 :])) < 0.03

@@ -79,7 +79,8 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
     `default_joint_pos` [rad] is where they stand. A policy with servos has `joint_stiffness`
     [N·m/rad], `joint_damping` [N·m·s/rad], and `joint_hold` [rad], the target at an action of 0.
     `command_calibration` (JSON) is a `Calibration`, through which a command goes before it is
-    observed.
+    observed. `observation_history_stride` is there for a policy that runs more often than it was
+    trained to: `control_period`s from frame to frame, see `poise.envs.balance.mdp.interleaving`.
     """
     robot, config, made = env.robot, policy.config, actions(env)
     dofs = np.asarray(robot.motor_dofs)
@@ -101,6 +102,8 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
         "timesteps": str(policy.state["timesteps"]),
         "poise_version": poise.__version__,
     }
+    if (stride := env.config.observation.history_stride) > 1:
+        said["observation_history_stride"] = str(stride)
     if isinstance(env, ResidualBalanceEnv):
         said |= {
             "controller": config.controller,
