@@ -158,7 +158,7 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> Table:
         kicked = {level["level"]: level for level in _levels(entry, KICKED)}
         rows.append([str(rank.get(name) or NONE), code(name), *_j50(entry), *_pushes(entry),
                      *(_upright(kicked.get(kick)) for kick in kicks),
-                     f"{fallen} of {trials}", f"{followed} of {trials}"])  # fmt: skip
+                     f"{fallen}/{trials}", f"{followed}/{trials}"])  # fmt: skip
     return head, rows
 
 
@@ -179,11 +179,11 @@ def _pushes(entry: Entry) -> tuple[str, str]:
         return NONE, NONE
     trials = sum(w["trials"] for w in levels)
     upright = trials - sum(w["fallen"] for w in levels)
-    return f"{upright} of {trials}", f"{sum(w['recovered'] for w in levels)} of {trials}"
+    return f"{upright}/{trials}", f"{sum(w['recovered'] for w in levels)}/{trials}"
 
 
 def _upright(level: WalkLevel | None) -> str:
-    return f"{level['trials'] - level['fallen']} of {level['trials']}" if level else NONE
+    return f"{level['trials'] - level['fallen']}/{level['trials']}" if level else NONE
 
 
 #: of a command; a page has room for two digits of steps

@@ -69,7 +69,7 @@ def test_walks_are_ranked_by_j50_whatever_the_order_of_results(tmp_path: Path) -
     assert float(places["`walk`"][2].split()[0]) > float(places["`walk-spring`"][2].split()[0])
     walks = [level for level in entry["walks"] if level["part"] == "walk"]
     fallen = sum(w["fallen"] for w in walks)
-    assert fallen > 0 and places["`walk-spring`"][6] == f"{fallen} of {6 * len(walks)}"
+    assert fallen > 0 and places["`walk-spring`"][6] == f"{fallen}/{6 * len(walks)}"
 
 
 def test_one_without_a_j50_comes_last_without_a_rank(tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_older_verdicts_are_not_ranked_among_newer_ones(tmp_path: Path) -> None:
     )
     ranked = {row[1]: row for row in rows(mixed)[2:4]}
     assert ranked["`walk-spring`"][0] == "1" and ranked["`walk`"][0] == "–"
-    assert ranked["`walk`"][2] == "–" and " of 48" in ranked["`walk`"][5]
+    assert ranked["`walk`"][2] == "–" and "/48" in ranked["`walk`"][5]
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_kicks_have_a_column_each_and_levels_tables_of_their_own(tmp_path: Path)
     head, _, *ranked = rows(ideal)
     assert head[5:7] == ["kicked 1 m/s", "kicked 3 m/s"]
     assert {row[1]: row[6:8] for row in ranked[:2]} == {
-        "`walk`": ["18 of 20", "5 of 20"], "`walk-spring`": ["–", "–"]}  # fmt: skip
+        "`walk`": ["18/20", "5/20"], "`walk-spring`": ["–", "–"]}  # fmt: skip
     assert [row[:2] for row in rows(field)[2:3]] == [["1", "`walk`"]]
     assert rows(field)[2][2] == ranked[1][2] and "kicked" not in field
 
