@@ -210,10 +210,11 @@ def _described(controller: str | Path | Mapping[str, object]) -> ControllerConfi
 def _build(data: dict[str, object], source: str) -> ControllerConfig:
     """A configuration; `qp` may be the name of one of the momentum QP, or its mapping.
 
-    `base` names a controller whose fields hold where `data` has none of its own; within `qp` and
-    `step_qp` one of the momentum QP.
+    `base` names a controller, or a public policy, whose fields hold where `data` has none of its
+    own; within `qp` and `step_qp` one of the momentum QP.
     """
-    bases = RIVALS if data.get("kind") == "policy-file" else "controllers"
+    of_policy = data.get("base") in packaged(RIVALS) and "kind" not in data
+    bases = RIVALS if of_policy or data.get("kind") == "policy-file" else "controllers"
     not_given = {"uncertain", "uncertain_from"} - data.keys()
     data = on_base(data, bases, source, parts=("qp", "step_qp"))
     data = {name: value for name, value in data.items() if name not in not_given}

@@ -2,6 +2,7 @@
 
 import pytest
 
+from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.registry import (
     controller_config,
     is_replaced,
@@ -13,6 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.configs.schema import to_dict
 from poise.envs.sensing.realism import load_realism
+from tests.support.policies import linear, write_onnx
 from tests.support.refused import invalid
 from tests.support.shared import robot
 
@@ -40,6 +42,16 @@ def test_the_packaged_variant_differs_in_its_solver_alone():
     assert isinstance(variant, MomentumQPConfig) and variant.solver == "osqp"
     different = {k for k, v in to_dict(variant).items() if v != to_dict(base)[k]}
     assert different == {"solver", "solver_options"}
+
+
+def test_a_public_policy_is_a_base_without_a_kind(tmp_path):
+    """The field `kind` is that of its description."""
+    write_onnx(tmp_path / "own.onnx", linear(384, 29))
+    path = tmp_path / "twice.yaml"
+    path.write_text("base: amp-getup-g1\npolicy: own.onnx\ncopies: 2\n")
+    config = controller_config(path)
+    assert isinstance(config, PolicyFileConfig)
+    assert (config.copies, config.policy_period, len(config.joints)) == (2, 0.02, 29)
 
 
 @pytest.mark.parametrize("base", ["nonsense", "3", "{}"])
