@@ -1,6 +1,6 @@
 """The code that may run: what the user has named, never what a file has.
 
-Files that are read (policies, results, configurations) may name a class from outside, and to find
+Files that are read (policies, results, configurations) may name an external class, and to find
 it is to run its module. `find_plugin`, the one function that imports what has been named, asks
 `check_allowed` first. Nothing is allowed to begin with; a scope is opened with
 
@@ -123,7 +123,7 @@ def allows(*handed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def named(*controllers: object) -> list[str]:
-    """Names of classes from outside among what a user has typed or handed over as controllers.
+    """Names of external classes among what a user has typed or handed over as controllers.
 
     That is ``module:Class``, and what a mapping or a file of ``kind: outside`` names: the mapping
     or the file itself, not what its `base` says. Of a list, its members are looked at.

@@ -39,7 +39,7 @@ class PluginConfig:
 
 
 def plugin_config(name: str, arguments: dict[str, object] | None = None) -> PluginConfig:
-    """The configuration of a class from outside; raises ConfigError where there is none."""
+    """The configuration of an external class; raises ConfigError where there is none."""
     found = find_plugin(name)
     try:
         path = inspect.getsourcefile(found)
@@ -80,7 +80,7 @@ def make_plugin(name: str, robot: Robot, arguments: dict[str, object] | None = N
 
 
 class PluginController(WrappedController):
-    """A controller from outside, whose torques are checked before they act.
+    """An external controller, whose torques are checked before they act.
 
     A wrong shape or a number that is not finite is an error: MuJoCo would act on zeros instead.
     A subclass of `BaseController` reports more than its torques.

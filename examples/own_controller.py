@@ -1,4 +1,4 @@
-"""A controller from outside, in the three places where it can act.
+"""An external controller, in the three places where it can act.
 
     python examples/own_controller.py
 

@@ -82,7 +82,7 @@ class CommandedEnv(BalanceEnv):
         """The command of a controller now; None for a controller that follows none.
 
         Setting it ends the commands of the reset. Raises ConfigError for a controller that does not
-        walk, and for a command out of the robot's range. A policy from outside is commanded
+        walk, and for a command out of the robot's range. An external policy is commanded
         velocity and turn alone.
         """
         if self._walker is not None:

@@ -1,1 +1,1 @@
-"""Learned policies from outside: read from their files, and run as controllers."""
+"""Learned external policies: read from their files, and run as controllers."""

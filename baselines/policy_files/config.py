@@ -1,4 +1,4 @@
-"""The configuration of a policy from outside: its network, joints, observation and action."""
+"""The configuration of an external policy: its network, joints, observation and action."""
 
 from __future__ import annotations
 

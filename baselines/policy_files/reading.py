@@ -32,7 +32,7 @@ def advice(network: str | Path) -> str:
 
 
 def is_policy(name: object) -> bool:
-    """Return whether `name` is that of a policy from outside.
+    """Return whether `name` is that of an external policy.
 
     Such are packaged policies, ONNX files, folders that hold or describe a network, and files
     like ``deploy.yaml``.

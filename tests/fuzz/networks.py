@@ -1,4 +1,4 @@
-"""Policies from outside: ONNX files of all sorts, their data beside them, and `deploy.yaml`."""
+"""External policies: ONNX files of all sorts, their data beside them, and `deploy.yaml`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Policies from outside in the commands: evaluated, benchmarked, refused in one line."""
+"""External policies in the commands: evaluated, benchmarked, refused in one line."""
 
 from __future__ import annotations
 

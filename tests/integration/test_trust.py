@@ -486,7 +486,7 @@ def test_processes_are_told_what_is_allowed(ground: Ground, backend: str) -> Non
 
 
 def test_workers_load_what_is_allowed(ground: Ground) -> None:
-    """A controller from outside in a process of its own."""
+    """An external controller in a process of its own."""
     (ground.here / "fine.py").write_text(
         "class Zero:\n    period = 0.004\n    def __init__(self, robot): pass\n"
         "    def reset(self, state): pass\n    def torques(self, state, targets): return 0\n"

@@ -221,7 +221,7 @@ class TrainConfig:
         """Return the environment of this run; `overrides` replace its arguments or fields of `env`.
 
         A loaded `robot` spares loading it again. What the critic alone sees is left out. Raises
-        ConfigError for a controller from outside that the user has not allowed, see `allowing`.
+        ConfigError for an external controller that the user has not allowed, see `allowing`.
         """
         if self.env.observation.privileged and "observation" not in overrides:
             overrides["observation"] = replace(self.env.observation, privileged=())

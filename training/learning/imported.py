@@ -1,4 +1,4 @@
-"""A policy from outside as the first weights of a run: what it did is where learning begins.
+"""An external policy as the first weights of a run: what it did is where learning begins.
 
 Its observations and actions are affine in those of the environment, so that its network becomes
 the actor's, number by number: nothing is fitted.

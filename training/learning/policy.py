@@ -147,7 +147,7 @@ def load_policy(
     """Return a packaged policy, a policy folder, or the best checkpoint of a run folder.
 
     None is the packaged policy ``residual-torque``. No code from the files is executed, nor any
-    that they name: a policy on a controller from outside needs `allow`, the names
+    that they name: a policy on an external controller needs `allow`, the names
     (``module:Class``) that may run.
 
     A `robot` that differs from the policy's by its description's `options` alone, such as the time
@@ -155,7 +155,7 @@ def load_policy(
 
     Raises ConfigError naming the file when it is missing, truncated, made for another robot
     (of `robot`, or of the configuration's own), has another number of observations or actions, or
-    names a controller from outside that is not allowed.
+    names an external controller that is not allowed.
     """
     path = locate_policy(folder)
     with allowing(allow, source=path / CONFIG):

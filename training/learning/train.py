@@ -64,12 +64,12 @@ def train(
     (`widened`). The same configuration gives the same weights, whatever the number of threads; a
     resumed run starts new episodes, and so differs. `callback`, one of Stable-Baselines3 or
     several, is also called, such as Weights & Biases' `WandbCallback`; one that only reads
-    does not change the result. A controller from outside (``module:Class``)
+    does not change the result. An external controller (``module:Class``)
     that the configuration names must be among `allow`.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
     round; when the configurations or robots differ; when a file of last/ cannot be read; for
-    pushes that do not fit the robot; for a controller from outside that is not allowed. Raises
+    pushes that do not fit the robot; for an external controller that is not allowed. Raises
     PoiseError when another process writes to `out`, or a file cannot be written.
     """
     out = Path(out)

@@ -23,7 +23,7 @@ class GuardConfig:
     measure of the policy's own `hand_over`; the walker then restarts, with its command.
 
     Attributes:
-        walker: A policy from outside that follows a commanded velocity: a name or a path.
+        walker: An external policy that follows a commanded velocity: a name or a path.
         recovery: A policy with servos that take over (`action: whole`): a packaged one, or a folder
             of poise train.
         margin: Distance of the capture point from the support polygon beyond which it takes over
@@ -67,13 +67,13 @@ def guard_config(name: str | Path) -> GuardConfig:
 
 
 def walker_config(guard: GuardConfig, source: str) -> PolicyFileConfig:
-    """The configuration of the walker; raises ConfigError where it is no policy from outside."""
+    """The configuration of the walker; raises ConfigError where it is no external policy."""
     name, walkers = guard.walker, packaged(RIVALS)
     if not (is_policy(name) or is_file(name) or name in packaged("controllers")):
         raise ConfigError(f"no such policy: {shown(name)}{meant(name, walkers)}", source=source,
                           field="walker", choices=walkers)  # fmt: skip
     config = controller_config(name)
     if not isinstance(config, PolicyFileConfig):
-        raise ConfigError(f"{shown(name)} is of kind {config.kind!r}, no policy from outside",
+        raise ConfigError(f"{shown(name)} is of kind {config.kind!r}, no external policy",
                           source=source, field="walker", choices=walkers)  # fmt: skip
     return config

@@ -1,4 +1,4 @@
-"""Bounds of time and memory for a network from outside.
+"""Bounds of time and memory for an external network.
 
 Optimising it, or a loop within it, cannot be stopped from the thread that waits for it. So it is
 asked for the first time in a process of its own, whose time and memory the system bounds; what

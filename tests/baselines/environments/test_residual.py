@@ -205,7 +205,7 @@ def test_another_solver_is_really_used(solver):
 
 
 class Crouch:
-    """A controller from outside: joint-space springs, no solver, no record."""
+    """An external controller: joint-space springs, no solver, no record."""
 
     period = 0.01
 

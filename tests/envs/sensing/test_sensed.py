@@ -177,7 +177,7 @@ def test_real_environments_run_compiled(kind):
 
 
 def test_servos_go_by_their_own_present_readings():
-    """A policy from outside sees late joints; its motors' encoders err by their bias, and are not
+    """An external policy sees late joints; its motors' encoders err by their bias, and are not
     late."""
     level = {"sensors": {"encoder_bias": 0.05}, **LATE}
     env = PositionBalanceEnv(robot(), pushes=None, realism=level, estimator={"predictor": "none"})

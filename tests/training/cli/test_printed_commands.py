@@ -41,7 +41,7 @@ ENDS = {"view": ["--seconds", "0.2", "--port", "0"], "evaluate": ["--trials", "1
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The current folder, of an awkward name; trials are played in this process.
 
-    It holds a controller from outside, `mine.py:StifferAnkles`, and a file that names it.
+    It holds an external controller, `mine.py:StifferAnkles`, and a file that names it.
     """
     pytest.importorskip("viser", reason="not installed: pip install 'poise[view]'")
     folder = tmp_path / FIELD
@@ -71,7 +71,7 @@ def played(command: str) -> int:
 
 
 def test_of_lost_trials(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A controller from outside; a file that names one, which needs what it was allowed before."""
+    """An external controller; a file that names one, which needs what it was allowed before."""
     names = ["zero", "mine.py:StifferAnkles", "my file.yaml"]
     args = ["evaluate", *names, "--suite", "suite.yaml", "--trials", "2", "--out", "my out"]
     assert main([*args, "--allow", "mine.py:StifferAnkles"]) == 0

@@ -70,7 +70,7 @@ def test_a_gain_is_told_with_its_interval() -> None:
 
 
 def test_what_comes_next_fits_the_run() -> None:
-    """Its robot, a controller from outside, a walk; a policy alone is compared with nothing."""
+    """Its robot, an external controller, a walk; a policy alone is compared with nothing."""
     out = finished_run()
     other = replace(tiny_config(), robot="tall", controller="mine.py:Mine")
     *_, evaluate, view = last_words(other, out)

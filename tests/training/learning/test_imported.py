@@ -1,4 +1,4 @@
-"""A policy from outside as the first weights: it does what it did, where servos are moved."""
+"""An external policy as the first weights: it does what it did, where servos are moved."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -105,7 +105,7 @@ def follow(
             motion is made first: a .motion or .csv file, the name of a packaged one, or its text.
             For a tracker also a clip of its maker's: .npz of Isaac Lab or mjlab, .csv of LAFAN1, or
             "network" for the one within its network.
-        controller: a controller as poise evaluate takes it; a policy from outside that tracks
+        controller: a controller as poise evaluate takes it; an external policy that tracks
             motions follows clips.
         starts: number of trials, each from a differently disturbed start; by default 20, or 5 at
             each tempo of --fastest.

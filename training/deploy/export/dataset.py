@@ -49,7 +49,7 @@ def write_dataset(
         robot: packaged or a .yaml description.
         trials: instead of the suite's number.
         seed: of the trials.
-        allow: controllers from outside that may run though a file names them.
+        allow: external controllers that may run though a file names them.
 
     Returns:
         how many episodes, steps and recoveries it has.

@@ -85,7 +85,7 @@ def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> Policy
         return PolicyCheck(file, None, sizes, guesses, unsaid, None, ())
     config = controller_config(known or file)
     if not isinstance(config, PolicyFileConfig):
-        raise ConfigError("is no policy from outside", source=file, field="policy")
+        raise ConfigError("is no external policy", source=file, field="policy")
     sizes = network_sizes(Path(config.policy))
     steps = steps_missing(robot, config, sizes)
     tried = try_histories(robot, config, steps) if steps > 1 else []

@@ -53,7 +53,7 @@ def load_standalone(
 
     Args:
         name: as `poise evaluate` takes it: a packaged controller or policy, a .yaml file of a
-            controller, a folder of `poise train`, a policy from outside, or ``module:Class``.
+            controller, a folder of `poise train`, an external policy, or ``module:Class``.
         robot: a packaged robot, a .yaml description, or a robot. A policy must be for it.
         realism: what is known of a real robot: a level's name, a .yaml file, or a mapping.
         allow: what may run though a file names it, as of `load_policy`.

@@ -1,4 +1,4 @@
-"""Trials in which a tracker, a policy from outside, follows a clip; it may be pushed."""
+"""Trials in which a tracker, an external policy, follows a clip; it may be pushed."""
 
 from collections.abc import Callable
 from dataclasses import asdict, replace

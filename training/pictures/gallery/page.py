@@ -54,7 +54,7 @@ def write_gallery(
         controllers: of those that took part, from left to right; none: the best four.
         sizes: of the pushes in each sector.
         console: where progress and the path are printed; None: nowhere.
-        allow: controllers from outside (``module:Class``) that may run.
+        allow: external controllers (``module:Class``) that may run.
 
     Raises:
         ConfigError: as `replay`; no single push that all of them met; more than fits into a page.

@@ -63,7 +63,7 @@ def write_report(
         out: the file; `folder`/report.html if not given.
         films: simulate the worst trials again, for pictures and plots over time (seconds for each).
         console: where progress and the path are printed; None: nowhere.
-        allow: controllers from outside (``module:Class``) that may run; others are not run.
+        allow: external controllers (``module:Class``) that may run; others are not run.
 
     Raises:
         ConfigError: the folder holds no finished evaluation, or its files are not whole.
@@ -177,7 +177,7 @@ def _film(
         return film_again(results, record, times, draw)
     except PoiseError as error:
         reason = str(error)
-    except Exception as error:  # a controller from outside may raise anything
+    except Exception as error:  # an external controller may raise anything
         reason = raised(error)
     note = f"{record.controller} was not simulated again: {reason}."
     if note not in notes:

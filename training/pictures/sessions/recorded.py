@@ -57,7 +57,7 @@ def recorded_trial(
         folder: written by `evaluate` or `benchmark`.
         trial: its number in trials.csv.
         controllers: of those that took part; none: the last one, as `replay`.
-        allow: controllers from outside that may run.
+        allow: external controllers that may run.
 
     Returns:
         the trial, and a line about each controller.

@@ -66,7 +66,7 @@ def play_walk(
         seed: of the start, which is a little disturbed.
         video: an MP4 or WebP file to write.
         say: what prints the lines.
-        allow: controllers from outside (``module:Class``) that may run.
+        allow: external controllers (``module:Class``) that may run.
 
     Raises:
         ConfigError: a number, a name or a file that is not valid; a controller that does not walk.

@@ -197,7 +197,7 @@ class BrowserView:
             job()
         except PoiseError as error:
             self._pages.say(str(error), "red")
-        except Exception as error:  # a controller from outside, or a page that is not ours
+        except Exception as error:  # an external controller, or a page that is not ours
             self.paused = True
             self._pages.say(raised(error), "red")
 

@@ -50,7 +50,7 @@ def view(
         native: MuJoCo's own window instead of a page, of one controller.
         seconds: of the wall clock after which it ends; None: when the process is stopped.
         dark: whether the page is dark.
-        allow: controllers from outside that may run though only a file names them.
+        allow: external controllers that may run though only a file names them.
 
     Raises:
         ConfigError: anything named does not exist or is not valid; nothing has been loaded then.

@@ -102,7 +102,7 @@ def test_it_takes_over_at_its_limits_by_what_is_believed(
 
 
 def test_the_state_is_estimated_whatever_the_walker_reads(walker: str) -> None:
-    """A policy from outside gets what is measured; the guard asks for velocities."""
+    """An external policy gets what is measured; the guard asks for velocities."""
     level = load_realism("field")
     plain = ResidualBalanceEnv(shared_robot("compact"), controller=walker, realism=level)
     env = guarded(walker, FAR, realism=level)

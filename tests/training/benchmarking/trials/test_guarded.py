@@ -33,7 +33,7 @@ def walker(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("fields", "problem"),
     [
-        ({"walker": "walk"}, r"walker: 'walk' is of kind 'walk', no policy from outside "
+        ({"walker": "walk"}, r"walker: 'walk' is of kind 'walk', no external policy "
                              r"\(choices: amp-getup-g1, asap-loco-g1"),
         ({"walker": "falcon-locos-g1"}, "walker: no such policy: 'falcon-locos-g1', did you mean "
                                         "falcon-loco-g1"),

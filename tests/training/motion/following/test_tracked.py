@@ -1,4 +1,4 @@
-"""training/motion/following/tracked.py: a policy from outside follows a clip."""
+"""training/motion/following/tracked.py: an external policy follows a clip."""
 
 from __future__ import annotations
 

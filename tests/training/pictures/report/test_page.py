@@ -223,7 +223,7 @@ NAMED = """(name) => document.querySelectorAll("tbody th, figcaption").forEach((
 
 
 def test_a_long_name_breaks(report: Path, browser: Browser) -> None:
-    """Of a controller from outside: no page is wider for it, and the ranking is whole on a desk."""
+    """Of an external controller: no page is wider for it, and the ranking is whole on a desk."""
     for width in (320, 1400):
         browser.open(report, width)
         browser.run(f"({NAMED})('my_own_controller.py:WithStifferAnkles')")
