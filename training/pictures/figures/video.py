@@ -91,16 +91,16 @@ def record_together(
 ) -> int:
     """Film several episodes side by side, each under its name; returns the number of frames.
 
-    They run at the same time, so they must have the same policy period. One that has ended stays as
-    it was then, until the last has ended; one that has fallen goes to the ground first.
+    They run at the same time, whatever their policy periods. One that has ended stays as it was
+    then, until the last has ended; one that has fallen goes to the ground first.
 
     Raises:
-        ConfigError: the path, rate or size is not valid, or periods or sizes differ.
+        ConfigError: the path, rate or size is not valid, or sizes differ.
         PoiseError: the video cannot be encoded, or the file cannot be written.
     """
     own = list(episodes.values())
-    if not own or len({(each.base.config.policy_period, each.size) for each in own}) != 1:
-        raise ConfigError("give one or more, of one policy period and size", field="episodes")
+    if not own or len({each.size for each in own}) != 1:
+        raise ConfigError("give one or more, of one size", field="episodes")
     _check(path, fps, 1.0, own[0].size)
 
     def frame() -> np.ndarray:
@@ -186,20 +186,23 @@ def _film(
 
     Returns how many frames there are, and how many the video has a second.
     """
-    period = episodes[0].base.config.policy_period * slow_motion
-    every = max(1, round(1.0 / (fps * period)))  # policy steps from frame to frame
-    rate = 1.0 / (every * period)
+    periods = [each.base.config.policy_period for each in episodes]
+    longest = max(periods)
+    every = max(1, round(1.0 / (fps * longest * slow_motion)))  # its steps from frame to frame
+    rate = 1.0 / (every * longest * slow_motion)
     width, height = episodes[0].size
-    frames, step = 1, 0
+    frames, step, taken = 1, 0, [0] * len(episodes)
     with encoded(path, (width * len(episodes), height), rate) as send:
         for each in episodes:
             each.start()
         send(frame())
         while not all(each.over for each in episodes):
             playing = [each for each in episodes if not each.over]
-            for each in playing:
-                each.step()
             step += 1
+            for i, each in enumerate(episodes):
+                while not each.over and taken[i] * periods[i] < step * longest - 1e-9:
+                    each.step()
+                    taken[i] += 1
             ended = all(each.over for each in episodes)
             if step % every == 0 or ended:
                 for each in playing:

@@ -14,6 +14,7 @@ from poise.training.pictures.figures.video import (
     Episode,
     frame_strip,
     record,
+    record_together,
 )
 
 
@@ -46,6 +47,25 @@ def test_video_holds_the_episode(can_render, env, tmp_path):
     assert summary["seconds"] == pytest.approx(0.2) and summary["fps"] == 25.0
     assert summary["fallen"] is False and np.isfinite(summary["return"])
     assert [p.name for p in path.parent.iterdir()] == ["a.mp4"]
+
+
+def test_policies_of_other_periods_are_filmed_together(can_render, env, tmp_path, monkeypatch):
+    """Each takes as many steps as fit into the time that the other has played."""
+    fast = gymnasium.make("poise/TorqueBalance-v0", duration=0.2, pushes=None, policy_period=0.004)
+    times = []
+    with Episode(env, still, {"seed": 1}, size=(64, 48)) as a:
+        with Episode(fast, still, {"seed": 1}, size=(64, 48)) as b:
+            drawn = a.draw
+
+            def draw():
+                times.append((a.base.simulation.time, b.base.simulation.time))
+                drawn()
+
+            monkeypatch.setattr(a, "draw", draw)
+            count = record_together({"a": a, "b": b}, tmp_path / "both.mp4")
+            assert (a.base.steps, b.base.steps) == (10, 50)
+    assert count == len(times) and times[-1] == pytest.approx((0.2, 0.2))
+    np.testing.assert_allclose(*np.array(times[1:]).T, atol=1e-9)
 
 
 def test_a_robot_that_falls_is_shown_until_it_lies(can_render, tmp_path):
