@@ -139,6 +139,10 @@ def _run(args: list[str]) -> int:
         run_train(given)
         return 0
     if name == "motion":  # it has sub-commands
+        if {"--video", "--report"} & {word.partition("=")[0] for word in given}:
+            from poise.envs.viewing.gl import choose_gl_backend
+
+            choose_gl_backend()  # before the sub-commands import MuJoCo
         return int(load_extra("commands", name)(given))
     if name == "policies":  # it has one, too
         return run_policies(given)

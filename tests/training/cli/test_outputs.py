@@ -69,3 +69,16 @@ def test_a_result_of_something_else(cold: Path, capsys: pytest.CaptureFixture[st
     ResultFolder(cold / "other", SETTINGS).close()
     error = refused("evaluate zero --suite random --out other --seed 7", capsys)
     assert "settings.yaml: suite: holds a result with other suite" in error
+
+
+@pytest.mark.parametrize("option", ["--video", "--report=page.html", "--out"])
+def test_motions_are_drawn_without_a_display(option, monkeypatch):
+    """What draws is chosen before a sub-command imports MuJoCo, and only where a picture is due."""
+    order = []
+    monkeypatch.setattr("poise.envs.viewing.gl.choose_gl_backend", lambda: order.append("gl"))
+    monkeypatch.setattr(
+        "poise.training.cli.entry.load_extra",
+        lambda kind, name: lambda given: order.append(name) or 0,
+    )
+    assert main(["motion", "play", "squat", option]) == 0
+    assert order == (["motion"] if option == "--out" else ["gl", "motion"])
