@@ -215,8 +215,8 @@ class PolicyFileConfig:
         phase_runs: whether the clock runs always, or restarts when a velocity is commanded.
         policy_period: of the policy [s].
         copies: how many copies of the policy take turns within a `policy_period`, each with
-            observations of its own; actions are less late so. None that remembers, or follows a
-            motion.
+            observations of its own, so that actions are less late. A policy that remembers or
+            follows a motion has one.
         hold: joints that the policy does not have are held in the standing posture, critically
             damped, with this natural frequency [rad/s].
         digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in,

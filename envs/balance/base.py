@@ -105,9 +105,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         #: entries of the policy's observation; the others are privileged
         self.seen = sum(term.size for term in seen)
         sizes = {"na": len(self.action_names), "no": size, "terms": len(REWARD_TERMS)}
-        stride = chosen.history_stride
         frame = sum(term.size for term in self._newest)
-        sizes["past"] = frame * kept_frames(chosen.history, stride) if stride > 1 else 0
+        sizes["past"] = frame * kept_frames(chosen.history, chosen.history_stride)
         self.episode = EpisodeArrays.allocate(
             sizes | self.simulation.sizes, metrics=Metrics.allocate()
         )

@@ -35,8 +35,9 @@ class Interleaving(Block):
 
 
 def kept_frames(history: int, stride: int) -> int:
-    """Return how many policy steps an observation of `history` frames reaches back."""
-    return history * stride + stride // 2
+    """Return how many policy steps an observation of `history` frames reaches back, beside itself:
+    none where the stride is 1."""
+    return history * stride + stride // 2 if stride > 1 else 0
 
 
 def interleaving(
