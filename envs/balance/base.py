@@ -80,6 +80,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self._set_up_rendering(self.robot.model, render_mode, width, height, camera)
         self.estimator, self.physics = self.config.estimator, self.config.physics
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
+        if self.push_sampler is not None:
+            self.push_sampler.check_limits()
         self.simulation = Simulation(self.robot)
         self.arrays: RobotArrays = self.simulation.arrays  #: of `robot`
         self.realism = self.config.realism

@@ -197,7 +197,7 @@ def _read_policy(path: Path, robot: Robot | None) -> Policy:
     layers = _read_weights(path / POLICY)
     robot = robot or load_robot(config.robot)
     if not _in_other_physics(config, robot, state):
-        check_policy_robot(state, robot.fingerprint, path / STATE)
+        check_policy_robot(state, robot.fingerprint, path / STATE, robot.name)
     check_controller(state, config, path / STATE)
     env = config.make_env(robot)
     seen, outputs = env.observation_space.shape[0], env.action_space.shape[0]

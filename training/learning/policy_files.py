@@ -59,12 +59,17 @@ def place_beside(folder: Path, suffix: str) -> Path:
     return folder.parent / f".{folder.name}.{suffix}"
 
 
-def check_policy_robot(state: dict[str, object], fingerprint: str, path: Path) -> None:
-    """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
+def check_policy_robot(
+    state: dict[str, object], fingerprint: str, path: Path, name: str | None = None
+) -> None:
+    """Raise ConfigError unless the policy was trained for the robot with this fingerprint, and
+    `name`, if that is known."""
     if state.get("fingerprint") != fingerprint:
+        trained = state.get("robot")
+        now = " as it was then" if name in (None, trained) else f", not on {shown(name)}"
         raise ConfigError(
-            f"the policy was trained on the robot {shown(state.get('robot'))} as it was then: name "
-            "that one, or train a policy on this one",
+            f"the policy was trained on the robot {shown(trained)}{now}: name that one, or train a "
+            "policy on this one",
             source=path,
             field="robot",
         )

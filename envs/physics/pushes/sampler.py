@@ -27,6 +27,10 @@ Unit = Literal[
 ]
 PROFILES: tuple[Profile, ...] = ("square", "half-sine")
 LIMIT_DURATION = 0.1  # [s] of the pushes that a limit table was measured with
+NO_LIMITS = (
+    "needs the controller's J50 by direction, which controller_fraction is a fraction of: copy "
+    "`table` of `poise evaluate CONTROLLER --suite envelope --write-limits FILE`"
+)
 
 
 def push_bodies(robot: Robot) -> tuple[str, ...]:
@@ -126,6 +130,12 @@ class PushSampler:
             if low > high:
                 raise ValueError(f"{name}: the range [{low}, {high}] must not decrease")
 
+    def check_limits(self) -> None:
+        """Raise ConfigError for a controller_fraction without a `limit_table`."""
+        for pushes in (self, *self.others):
+            if pushes.unit == "controller_fraction" and pushes.limit_table is None:
+                raise ConfigError(NO_LIMITS, field="limit_table")
+
     def sample(
         self,
         rng: np.random.Generator,
@@ -188,9 +198,7 @@ class PushSampler:
             return Kick(start, value, direction)
         if self.unit == "controller_fraction":
             if limits is None:
-                raise ConfigError(
-                    "needs the controller's limits, unknown here", field="limit_table"
-                )
+                raise ConfigError(NO_LIMITS, field="limit_table")
             omega = robot.omega
             longer = duration_factor(omega, duration, profile)
             impulse = value * limits(direction) * longer / duration_factor(omega, LIMIT_DURATION)

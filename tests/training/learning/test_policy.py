@@ -207,6 +207,8 @@ def test_another_robot_is_refused(folder):
         ConfigError, match=f"{STATE}: robot: the policy was trained on the robot 'humanoid'"
     ):
         load_policy(folder, robot("tall"))
+    with pytest.raises(ConfigError, match="'humanoid', not on 'tall'"):
+        load_policy(folder, robot("tall"))
     assert load_policy(folder, robot()).state["robot"] == "humanoid"
 
 

@@ -30,8 +30,8 @@ class Diagnosis:
     #: commanded), "motion" (a fall from a motion), "down" (it did not get up), "error"
     loss: str | None = None
     loss_body: str | None = None  #: that touched the ground, where that is the criterion
-    #: motor between root and soles that was first at its limit after the first push, for 2 policy
-    #: steps or more in a row. Arms are swung as hard as they can be, which is no reason to fall
+    #: motor between root and soles that was first at its torque limit after the first push, for 2
+    #: policy steps or more in a row. Arms are swung as hard as they can be: no reason to fall
     saturated_motor: str | None = None
     saturated_from: float | None = None  #: when that began
     saturated_time: float | None = None  #: how long it lasted then

@@ -54,8 +54,8 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
     causes: list[tuple[float, str]] = []
     if d.saturated_motor is not None and d.saturated_from is not None:
         since, lasted = f"{d.saturated_from:.2f}", f"{d.saturated_time:.2f}"
-        causes.append((d.saturated_from, f"{d.saturated_motor} at its limit from {since} s, for "
-                                         f"{lasted} s"))  # fmt: skip
+        causes.append((d.saturated_from, f"{d.saturated_motor} at its torque limit from {since} s, "
+                                         f"for {lasted} s"))  # fmt: skip
     if d.failures_from is not None:
         then = ", when it was falling already" if _fell_before(d) else ""
         causes.append(
@@ -73,18 +73,23 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
     return f"{end}. Before: {before}." if before else f"{end}."
 
 
-def cause(d: Diagnosis, steps: int) -> str:
-    """Return the cause of a loss in a few words, without numbers and sides, to count by."""
+def cause(d: Diagnosis, steps: int | None) -> str:
+    """Return the cause of a loss in a few words, without numbers and sides, to count by.
+
+    `steps` is the number of planned steps, None of a controller that plans none.
+    """
     if d.loss in ("diverged", "error", "down"):
         return LOSSES[d.loss]
-    first = "no motor of the legs at its limit"
+    first = "no motor of the legs at its torque limit"
     if d.hardware is not None:
         first = d.hardware
+    elif _left_before(d, d.saturated_from):
+        first = "capture point outside of the support"
     elif d.saturated_motor is not None:
-        first = f"{SIDE.sub('', d.saturated_motor).strip('_')} at its limit"
+        first = f"{SIDE.sub('', d.saturated_motor).strip('_')} at its torque limit"
     if d.failures_from is not None and d.failures_from <= (d.saturated_from or float("inf")):
         first = first if _fell_before(d) else "QP without a solution"
-    then = {0: "no planned step", 1: "one step was not enough"}.get(
+    then = {None: "", 0: "no planned step", 1: "one step was not enough"}.get(
         steps, "its steps were not enough"
     )
     slipped = d.foothold == "slipped" and (d.foothold_time or 0.0) <= (d.capture_left or 0.0)
@@ -94,19 +99,30 @@ def cause(d: Diagnosis, steps: int) -> str:
         then = "did not come to rest"
     if d.loss == "off command":
         then = "left its command"
-    return f"{first}, then {then}"
+    return f"{first}, then {then}" if then else first
+
+
+def _left_before(d: Diagnosis, time: float | None) -> bool:
+    """Return whether the capture point had left the support for good at `time` (None: never): what
+    comes after that is a consequence of the fall, not its cause."""
+    return d.capture_left is not None and d.capture_left <= (float("inf") if time is None else time)
 
 
 def _fell_before(d: Diagnosis) -> bool:
     """Return whether the capture point had left the support for good when the QP first failed: no
     torques then bring it back, and a foot that tilts or lifts leaves the QP without the forces that
     it needs. The failure is a consequence of the fall, not its cause."""
-    return d.failures_from is not None and (d.capture_left or float("inf")) <= d.failures_from
+    return d.failures_from is not None and _left_before(d, d.failures_from)
 
 
-def losses(lost: Iterable[tuple[Diagnosis, int]]) -> list[Loss]:
-    """Return the causes of lost trials (diagnosis, steps), the most frequent one first."""
-    counts = Counter(cause(d, steps) for d, steps in lost if d.loss is not None)
+def losses(lost: Iterable[tuple[Diagnosis, int]], stepping: bool = True) -> list[Loss]:
+    """Return the causes of lost trials (diagnosis, planned steps), the most frequent one first.
+
+    Not `stepping`: the controller plans no steps, so none is missing.
+    """
+    counts = Counter(
+        cause(d, steps if stepping else None) for d, steps in lost if d.loss is not None
+    )
     return [{"cause": name, "trials": count} for name, count in counts.most_common()]
 
 

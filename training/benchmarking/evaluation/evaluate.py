@@ -1,5 +1,6 @@
 """Run a suite with several controllers: `poise evaluate` and `poise benchmark`."""
 
+import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -7,7 +8,7 @@ from rich.console import Console
 
 from poise.baselines.allowance import allows
 from poise.baselines.registry import available_controllers, walking_controllers
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, PoiseWarning
 from poise.configs.files import packaged, packaged_folder
 from poise.configs.reading import read_json, read_yaml
 from poise.envs.physics.pushes.sampler import LimitTable
@@ -79,6 +80,11 @@ def evaluate(
         reference=None, measured=lambda loaded: load_limits(loaded, limits), motions=motions,
         realism=realism, get_up=get_up, physics=physics,
     )  # fmt: skip
+    own = robot not in packaged("robots")  # whose published results count by ankle limits
+    if own and run.suite.relative and run.limits.table is None:
+        warnings.warn(f"no J50 of {run.robot.name} is known (--limits FILE, see --write-limits): "
+                      "pushes in controller_fraction are fractions of its ankle limit",
+                      PoiseWarning, stacklevel=2)  # fmt: skip
     return run.play(plots=True)
 
 

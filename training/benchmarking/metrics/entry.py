@@ -64,7 +64,8 @@ def controller_entry(
         "evaluated": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
-    if found := losses((o, o.steps) for t, o in evaluated if not is_won(t, o)):
+    stepping = any(outcome.steps for _, outcome in everything)
+    if found := losses(((o, o.steps) for t, o in evaluated if not is_won(t, o)), stepping):
         entry["losses"] = found
     if directional := trials_of_parts(evaluated, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))

@@ -84,6 +84,12 @@ class Suite(Standard):
         return {name: part for name, part in found.items() if part is not None}
 
     @property
+    def relative(self) -> bool:
+        """Whether pushes are fractions of the J50 in `--limits`."""
+        found = (getattr(part, "pushes", None) for part in self.parts.values())
+        return any(getattr(pushes, "unit", "") == "controller_fraction" for pushes in found)
+
+    @property
     def paired(self) -> bool:
         """Whether trials depend on the other controllers."""
         return any(part is not None and part.paired for part in (self.envelope, self.walk_push))

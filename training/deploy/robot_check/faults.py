@@ -237,9 +237,14 @@ def _unrest(check: RobotCheck) -> Iterator[Fault]:
         yield Fault("chatter", f"at rest its torques change by {rest.chatter:.0f} times their "
                                f"limits in a second: {why}")  # fmt: skip
     if rest.foot_drift > DRIFT or rest.lean > LEAN:
+        holds = "options.cone: elliptic with options.impratio: 100 holds feet better"
+        if check.self_contacts:
+            holds = "bodies that are inside each other push it"
+        elif rest.foot_drift <= DRIFT:
+            holds = why
         yield Fault("drift", f"at rest a foot drifts by {1000.0 * rest.foot_drift:.1f} mm and the "
-                             f"root leans {rest.lean:.1f}° within {DURATION:g} s; options.cone: "
-                             "elliptic with options.impratio: 100 holds feet better")  # fmt: skip
+                             f"root leans {rest.lean:.1f}° within {DURATION:g} s; "
+                             f"{holds}")  # fmt: skip
     if rest.unsolved > UNSOLVED * rest.ticks:
         yield Fault("unsolved", f"at rest the QP of {CONTROLLER} was not solved at {rest.unsolved} "
                                 f"of {rest.ticks} ticks: {why}")  # fmt: skip

@@ -8,6 +8,7 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
+from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.compiled.maths.pendulum import duration_factor
 from poise.envs.physics.pushes.options import body_names
 from poise.envs.physics.pushes.push import Kick
@@ -190,6 +191,16 @@ def test_what_the_robot_or_the_caller_lacks_is_named(robot):
     ]:
         with pytest.raises(ConfigError, match=word):
             sampler.sample(rng, robot)
+
+
+def test_an_environment_refuses_a_share_of_unknown_limits_before_its_reset(robot):
+    """Also where another distribution of the same sampler asks for it."""
+    share = PushSampler((1.0, 1.0), "controller_fraction")
+    table = LimitTable((0.0,), (18.0,))
+    TorqueBalanceEnv(robot, pushes=replace(share, limit_table=table))
+    for pushes in (share, PushSampler((1.0, 1.0), "impulse", others=(share,))):
+        with pytest.raises(ConfigError, match="limit_table.*--write-limits"):
+            TorqueBalanceEnv(robot, pushes=pushes)
 
 
 def test_a_specific_force_is_a_peak_force_over_the_mass(robot):

@@ -148,26 +148,35 @@ def test_words() -> None:
     found = Diagnosis("contact", "pelvis", "left_ankle_y", 0.62, 0.34, 0.84, 0.21, "missed", 1.12,
                       0.08, 0.7)  # fmt: skip
     assert why(found, 1.94) == (
-        "fell: pelvis touched the ground at 1.94 s. Before: left_ankle_y at its limit from "
+        "fell: pelvis touched the ground at 1.94 s. Before: left_ankle_y at its torque limit from "
         "0.62 s, for 0.34 s; no solution of its QP from 0.70 s on; capture point outside of the "
         "support for good from 0.84 s, by 0.21 m at most; foothold missed by 0.08 m at 1.12 s."
     )
-    assert cause(found, 2) == "ankle_y at its limit, then a foothold missed"
+    assert cause(found, 2) == "ankle_y at its torque limit, then a foothold missed"
     assert cause(replace(found, foothold="slipped"), 2).endswith("its steps were not enough")
     assert cause(replace(found, foothold="slipped", foothold_time=0.7), 2).endswith("d slipped")
     plain = replace(found, foothold=None, failures_from=None)
-    assert cause(plain, 0) == "ankle_y at its limit, then no planned step"
+    assert cause(plain, 0) == "ankle_y at its torque limit, then no planned step"
+    assert cause(plain, None) == "ankle_y at its torque limit"
+    after = replace(plain, saturated_from=0.85)  # the capture point left at 0.84 s
+    assert cause(after, 1) == "capture point outside of the support, then one step was not enough"
     assert cause(replace(plain, failures_from=0.5), 1).startswith("QP without a solution, then one")
     late = replace(plain, failures_from=0.9, saturated_motor=None, saturated_from=None)
-    assert cause(late, 0) == "no motor of the legs at its limit, then no planned step"
+    assert cause(late, None) == "capture point outside of the support"
+    calm = replace(late, capture_left=None, failures_from=None)
+    assert cause(calm, 0) == "no motor of the legs at its torque limit, then no planned step"
     assert "from 0.90 s on, when it was falling already" in why(late)
     early = replace(late, failures_from=0.8)
     assert cause(early, 0) == "QP without a solution, then no planned step"
     assert "falling already" not in why(early)
     assert cause(replace(plain, hardware="ankle motors too hot"), 0).startswith("ankle motors too")
     counted = losses([(plain, 0), (found, 2), (plain, 0), (Diagnosis(), 0)])
-    assert losses_text(counted) == ("of 3 losses 2: ankle_y at its limit, then no planned step; "
-                                    "1: ankle_y at its limit, then a foothold missed")  # fmt: skip
+    assert losses_text(counted) == (
+        "of 3 losses 2: ankle_y at its torque limit, then no planned step; "
+        "1: ankle_y at its torque limit, then a foothold missed"
+    )
+    fixed = losses([(plain, 0)], stepping=False)
+    assert fixed == [{"cause": "ankle_y at its torque limit", "trials": 1}]
     assert why(diagnosis_of({})) == "" and losses_text([]) == ""
     assert push_text(Push("torso", 1.0, 0.1, 20.0, 90.0)) == (
         "a push of 20.0 N·s in 0.10 s on torso towards 90° (left), at 1.00 s"

@@ -13,6 +13,8 @@ import pytest
 import yaml
 from rich.console import Console
 
+from poise.configs.errors import PoiseWarning
+from poise.configs.files import resolve
 from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.evaluation.evaluate import evaluate, measured_limits
 from poise.training.benchmarking.results.read import load_results
@@ -229,6 +231,11 @@ def test_measured_limits_are_what_the_random_suite_pushes_by(
     assert found["controllers"]["momentum-qp"]["fraction_of"] == "baseline J50"
     with invalid("suite"):
         measured_limits(found, tmp_path / "none.yaml", "humanoid")
+    own = str(resolve("robots", "compact"))
+    share = {"magnitude": [0.5, 0.5], "unit": "controller_fraction"}
+    suite = write_suite(tmp_path, {"duration": 1.6, "random": {"trials": 1, "pushes": share}})
+    with pytest.warns(PoiseWarning, match="no J50 of compact is known.*ankle limit"):
+        evaluate(["momentum-qp"], suite, out=tmp_path / "own", robot=own)
 
 
 @pytest.mark.parametrize(

@@ -116,12 +116,12 @@ def test_lost_trials_are_listed_with_the_command_that_shows_one() -> None:
     lost = {"a": [], "my[own].py:B": [3, 17], "c": list(range(4, 12))}
     entries: dict[str, Any] = {name: {} for name in lost}
     entries["c"] = {
-        "losses": [{"cause": "ankle_y at its limit, then no planned step", "trials": 8}]
+        "losses": [{"cause": "ankle_y at its torque limit, then no planned step", "trials": 8}]
     }
     print_lost(lost, entries, Path("out/x"), Console(file=text, width=40))
     assert text.getvalue().splitlines() == [
         "lost trials of my[own].py:B: 3, 17 (poise view out/x --trial 3 --controllers "
         "'my[own].py:B' --allow 'my[own].py:B')",
         "lost trials of c: 4, 5, 6, 7, 8, … (8) (poise view out/x --trial 4 --controllers c)",
-        "  of 8 losses 8: ankle_y at its limit, then no planned step",
+        "  of 8 losses 8: ankle_y at its torque limit, then no planned step",
     ]

@@ -316,7 +316,7 @@ def test_motors_that_stand_but_hold_no_push_are_warned_of(
     limit = '<limit lower="-2" upper="2" effort="9" velocity="10"/><dynamics damping="0.3"/>'
     weak = check_robot(write_urdf(tmp_path, limit=limit, armature={"*": 0.01}))
     assert weak.both_feet.possible and not weak.rest.fallen
-    assert weak.pushed.falls and weak.pushed.cause.endswith("at its limit")
+    assert weak.pushed.falls and weak.pushed.cause.endswith("at its torque limit")
     (fault,) = [each for each in weak.faults if each.kind == "pushed"]
     assert f"falls in {len(weak.pushed.falls)} of 8 directions" in fault.text
     console = Console(record=True, width=200)

@@ -49,6 +49,6 @@ def push_gently(robot: Robot) -> Pushed:
         outcome = run_trial(agent, Trial(k, 0, (push,)))
         if outcome.fallen:
             falls.append(direction)
-            causes[cause(outcome, 0).split(", then")[0]] += 1
+            causes[cause(outcome, None).split(", then")[0]] += 1
     common = causes.most_common(1)
     return Pushed(len(DIRECTIONS), tuple(falls), common[0][0] if common else "")
