@@ -5,10 +5,11 @@
 μ is the mean of the policy, ω the gyro's rate over √(g/h), g the direction of gravity, f (na,) a
 factor for each joint, L (na, 5). The right side is the mirror image of the left.
 
-    python -m tests.performance.attitude_law search even out/even --generations 9
-    python -m tests.performance.attitude_law search ideal out/ideal --start out/even/8.npz
-    python -m tests.performance.attitude_law compare out/ideal/9.npz --seed 95001 --batches 3
-    python -m tests.performance.attitude_law fold out/ideal/9.npz out/velocity-g1
+    python -m tests.performance.attitude_law search even out/even --generations 8 --spread 0.7
+    python -m tests.performance.attitude_law search ideal out/ideal --start out/even/7.npz \\
+        --generations 8
+    python -m tests.performance.attitude_law compare out/ideal/7.npz --seed 95001 --batches 3
+    python -m tests.performance.attitude_law fold out/ideal/7.npz out/velocity-g1
 
 `search` asks CMA-ES for 14 candidates a generation, all of which meet the same trials (`MIXES`).
 What counts is not to fall within 2.6 s of a kick or push, or how late. `--policy` is the walker,
