@@ -83,7 +83,7 @@ def cause(d: Diagnosis, steps: int | None) -> str:
     first = "no motor of the legs at its torque limit"
     if d.hardware is not None:
         first = d.hardware
-    elif _left_before(d, d.saturated_from):
+    elif steps is None and _left_before(d, d.saturated_from):  # steps may bring it back
         first = "capture point outside of the support"
     elif d.saturated_motor is not None:
         first = f"{SIDE.sub('', d.saturated_motor).strip('_')} at its torque limit"
