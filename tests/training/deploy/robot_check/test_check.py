@@ -20,6 +20,7 @@ from poise.envs.robots.robot import load_robot
 from poise.training.cli.entry import main
 from poise.training.deploy.robot_check import check as module
 from poise.training.deploy.robot_check.check import RobotCheck, check_robot
+from poise.training.deploy.robot_check.standing.rest import Rest
 from poise.training.deploy.robot_check.tables import print_robot_check, summary
 from poise.training.deploy.robot_check.uses import IN_PLACE, STEPPING, Uses
 from tests.support.small_biped import LEG, motors, write_biped
@@ -107,6 +108,12 @@ def test_a_body_in_another_is_warned_of(tmp_path: Path) -> None:
     assert "left_shin" in text["self-collision"] and "right_shin" not in text["self-collision"]
     assert "right_shin" in text["overlapping meshes"] and "mm" in text["overlapping meshes"]
     assert "convex hulls" in text["overlapping meshes"]
+    leaning = replace(found, rest=Rest(2.0, lean=6.3, foot_drift=1e-4))
+    clean = replace(leaning, self_contacts=())
+    drifting = replace(clean, rest=Rest(2.0, foot_drift=0.02))
+    told = [texts(each)["drift"] for each in (leaning, clean, drifting)]
+    assert "inside each other" in told[0] and "posture" in told[1]
+    assert "options.cone" in told[2] and "options.cone" not in "".join(told[:2])
 
 
 @pytest.mark.usefixtures("no_controllers")
