@@ -5,16 +5,17 @@
 μ is the mean of the policy, ω the gyro's rate over √(g/h), g the direction of gravity, f (na,) a
 factor for each joint, L (na, 5). The right side is the mirror image of the left.
 
-    python -m tests.performance.attitude_law search even out/even --generations 8 --spread 0.7
-    python -m tests.performance.attitude_law search ideal out/ideal --start out/even/7.npz \\
-        --generations 8
-    python -m tests.performance.attitude_law compare out/ideal/7.npz --seed 95001 --batches 3
-    python -m tests.performance.attitude_law fold out/ideal/7.npz out/velocity-g1
+    python -m tests.performance.attitude_law search even out/even --policy OLD --spread 0.7
+    python -m tests.performance.attitude_law search ideal out/ideal --policy OLD \\
+        --start out/even/7.txt
+    python -m tests.performance.attitude_law compare NUMBERS --policy OLD
+    python -m tests.performance.attitude_law fold NUMBERS NEW --policy OLD
 
 `search` asks CMA-ES for 14 candidates a generation, all of which meet the same trials (`MIXES`).
-What counts is not to fall within 2.6 s of a kick or push, or how late. `--policy` is the walker,
-`velocity-g1`, which as packaged has such a law (without it: commit a77f6efc). `fold` writes a
-policy folder: ELU is the identity above 0, so five units of each layer pass z on. Results:
+What counts is not to fall within 2.6 s of a kick or push, or how late. OLD is `velocity-g1`
+without a law (configs/policies at commit a77f6efc). NUMBERS is a file of `search`; those of the
+packaged policy are in tests/performance/attitude_law.txt. `fold` writes the policy folder NEW:
+ELU is the identity above 0, so five units of each layer pass z on. Results:
 docs/log/walking.md#a-law-of-attitude-on-velocity-g1-2026-11-30.
 """
 
@@ -151,7 +152,7 @@ def search(trials: Trials, out: Path, start: np.ndarray, generations: int, sprea
         begun, candidates = time.perf_counter(), strategy.ask()
         worth = [trials.play(each, 500 + generation)[0].mean() for each in candidates]
         strategy.tell(candidates, [-each for each in worth])
-        np.savez(out / f"{generation}.npz", mean=strategy.mean)
+        np.savetxt(out / f"{generation}.txt", strategy.mean)
         print(f"{generation}: best {max(worth):.3f}, mean {np.mean(worth):.3f}, "
               f"{time.perf_counter() - begun:.0f} s", flush=True)  # fmt: skip
 
@@ -212,12 +213,12 @@ def fold(numbers: np.ndarray, name: str, newest: int, out: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("task", choices=("search", "compare", "fold"))
-    parser.add_argument("what", help="a mix for search, else numbers.npz")
+    parser.add_argument("what", help="a mix for search, else a file of numbers")
     parser.add_argument("out", type=Path, nargs="?")
     parser.add_argument("--policy", default="velocity-g1", help="a packaged one, or its folder")
     parser.add_argument("--mix", choices=MIXES, default="ideal", help="of compare")
-    parser.add_argument("--start", type=Path, help="numbers.npz")
-    parser.add_argument("--generations", type=int, default=10)
+    parser.add_argument("--start", type=Path, help="a file of numbers")
+    parser.add_argument("--generations", type=int, default=8)
     parser.add_argument("--spread", type=float, default=0.5)
     parser.add_argument("--seed", type=int, default=95001)
     parser.add_argument("--batches", type=int, default=3)
@@ -226,7 +227,7 @@ def main() -> None:
     numbers = np.zeros(len(ROWS))
     known = args.start if args.task == "search" else Path(args.what)
     if known is not None:
-        numbers = np.load(known)["mean"]
+        numbers = np.loadtxt(known)
     if args.task == "search":
         search(trials, args.out, numbers, args.generations, args.spread)
     elif args.task == "compare":
