@@ -1,7 +1,6 @@
 """A file of finished trials, one JSON line each, that survives a kill or an exhausted disk."""
 
 import contextlib
-import errno
 import json
 import os
 from collections.abc import Mapping
@@ -51,8 +50,9 @@ class TrialLog(Generic[Key]):
         """Write an entry to the disk, completely or not at all; raises PoiseError."""
         line, size = _line(key, value).encode(), os.stat(self.path).st_size
         try:
-            if self._file.write(line) < len(line):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            left = memoryview(line)
+            while left:  # what a full disk or a limit on files leaves out raises its own reason
+                left = left[self._file.write(left) :]
             os.fsync(self._file.fileno())
         except OSError as error:
             with contextlib.suppress(OSError):
