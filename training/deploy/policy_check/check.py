@@ -83,7 +83,10 @@ def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> Policy
         guesses = tuple(_layouts(sizes, len(robot.joint_names)))
         unsaid = tuple(name for name in WORDS if name not in said)
         return PolicyCheck(file, None, sizes, guesses, unsaid, None, ())
-    config = controller_config(known or file)
+    # the network that was given, which need not be where known ones are looked for
+    config = controller_config(
+        file if known is None else {"kind": "policy-file", "base": known, "policy": str(path)}
+    )
     if not isinstance(config, PolicyFileConfig):
         raise ConfigError("is no external policy", source=file, field="policy")
     sizes = network_sizes(Path(config.policy))

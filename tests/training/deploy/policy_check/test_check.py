@@ -313,6 +313,20 @@ def test_a_known_network_is_recognised(tmp_path: Path, monkeypatch: pytest.Monke
     assert checking.known_as(path) is None
 
 
+def test_a_known_network_is_checked_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file that was given, though no copy is where known networks are looked for."""
+    path = write_onnx(tmp_path / "policy.onnx", linear(98, 29))
+    asked: list[Path] = []
+    monkeypatch.setattr(known, "places", lambda origin: [])
+    monkeypatch.setattr(checking, "known_as", lambda path: "unitree-mjlab-2026-03")
+    monkeypatch.setattr(checking, "network_sizes", lambda path: asked.append(path) or 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        check_policy(str(path), robot("compact"))
+    assert asked == [path]
+
+
 def test_the_known_policies_are_listed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
