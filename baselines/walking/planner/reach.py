@@ -107,13 +107,13 @@ def _check_steps(command: GaitCommand, robot: Robot, gait: Gait, limits: StepLim
     swing, period = steps_of(command, gait)
     most = _longest_step(command.ahead, swing, robot, limits)
     if abs(command.ahead) * period > most:
-        raise _out_of_reach("ahead", f"{command.ahead:g} m/s is steps of "
-                            f"{abs(command.ahead) * period:.3g} m in {period:.3g} s", robot,
+        raise _out_of_reach("ahead", f"{command.ahead:g} m/s, steps of "
+                            f"{abs(command.ahead) * period:.3g} m in {period:.3g} s,", robot,
                             f"at most {most:.3g} m in it, {most / period:.3g} m/s")  # fmt: skip
     aside = _widest_step(command.width or gait.width, swing, robot, limits)
     if abs(command.left) * period > aside:
-        raise _out_of_reach("left", f"{command.left:g} m/s is {abs(command.left) * period:.3g} m "
-                            f"to the side in a step of {period:.3g} s", robot,
+        raise _out_of_reach("left", f"{command.left:g} m/s, {abs(command.left) * period:.3g} m "
+                            f"to the side in a step of {period:.3g} s,", robot,
                             f"at most {aside:.3g} m in it, {aside / period:.3g} m/s")  # fmt: skip
     if command.step_length is not None:
         least = command.speed * (gait.time_min + gait.transfer_time)
