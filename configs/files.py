@@ -51,6 +51,8 @@ def resolve(kind: str, name: str | Path) -> Path:
     path = Path(name)
     if path.suffix.lower() in (".yaml", ".yml", *OTHERS.get(kind, ())) and is_file(path):
         return path
+    if str(name) and is_folder(path):
+        raise Problem("folder", None, kind, names, value=shown(str(name)))
     problem = "no file" if path.suffix or len(path.parts) > 1 else "unknown name"
     hint = meant(name, names) or ";"
     raise Problem(problem, None, kind, names, value=shown(str(name)), hint=hint)

@@ -16,6 +16,7 @@ TEXTS: Final[Mapping[str, str]] = MappingProxyType({
     "unknown value": "unknown value {value}",
     "unknown name": "no such name: {value}{hint} give a path to a .yaml file or a packaged name",
     "no file": "no such file: {value}{hint} give a path to a .yaml file or a packaged name",
+    "folder": "is a folder: {value}; give a path to a .yaml file or a packaged name",
     "unreadable": "cannot be read ({why})",
     "type": "must be {expected}, not {value}",
     "range": "must be {limits}, not {value}",

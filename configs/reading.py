@@ -132,6 +132,11 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         mark = error.problem_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise ConfigError(f"not valid YAML: {place}{error.problem}", source=path) from None
+    except yaml.reader.ReaderError as error:
+        line, why = text[: error.position].count(b"\n") + 1, "not UTF-8: save the file as UTF-8"
+        if "octet" not in error.reason and "byte" not in error.reason:
+            why = f"the character U+{error.character:04X} is none of YAML's"
+        raise ConfigError(f"not valid YAML: line {line}: {why}", source=path) from None
     except Exception as error:
         raise ConfigError(f"not valid YAML: {error}", source=path) from None
     if not isinstance(data, dict):

@@ -28,6 +28,7 @@ from .yaml_loader import DEPTH
 
 T = TypeVar("T")
 MOST_BASES = 32  # a file, its base, the base of that
+FINITE = "a finite number"
 MOST_ENTRIES = 1_000_000  # of an array among the values of a configuration
 
 
@@ -259,7 +260,7 @@ def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -
             except ConfigError as error:
                 errors.append(error)
     # An option that had the right shape failed inside: then only its error helps.
-    inside = [error for error in errors if error.field != path]
+    inside = [error for error in errors if error.field != path or _out_of_bounds(error)]
     if inside or len(errors) == 1:
         raise (inside or errors)[0]
     raise ConfigError(
@@ -268,6 +269,13 @@ def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -
         field=path,
         choices=[choice for error in errors for choice in error.choices or ()] or None,
     )
+
+
+def _out_of_bounds(error: ConfigError) -> bool:
+    """Whether a value is of the right type, and only its size is wrong."""
+    if not isinstance(error, Problem):
+        return False
+    return error.problem == "range" or error.facts.get("expected") == FINITE
 
 
 def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -> int | float:
@@ -283,7 +291,7 @@ def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -
     except OverflowError:  # of a whole number with more than 308 digits
         finite = False
     if not finite:
-        raise wrong("a finite number")
+        raise wrong(FINITE)
     for name, bound, inside in (
         ("least", "min", operator.ge), ("most", "max", operator.le), ("above", "above", operator.gt)
     ):  # fmt: skip

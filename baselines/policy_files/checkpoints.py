@@ -5,7 +5,8 @@ from pathlib import Path
 
 from poise.configs.errors import ConfigError
 
-PICKLE = b"\x80"  # that torch.save begins with, before PyTorch 1.6
+PICKLE = b"\x80"  # the first byte of one
+SAVED = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."  # that torch.save began with before PyTorch 1.6
 DATA, CONSTANTS = "data.pkl", "constants.pkl"  # of torch.save and torch.jit.save; the latter only
 
 
@@ -16,16 +17,15 @@ def check_no_checkpoint(path: Path) -> None:
     """
     try:
         with open(path, "rb") as file:
-            pickled = file.read(1) == PICKLE
+            first = file.read(len(SAVED))
+        pickled = first[:1] == PICKLE
         names = () if pickled else _names(path)
     except (OSError, ValueError):
         return
     if pickled or (DATA in names and CONSTANTS not in names):
-        raise ConfigError(
-            "is a checkpoint of weights, without the network that they belong to: export the "
-            "policy as ONNX or TorchScript with the program that trained it",
-            source=path,
-        )
+        what = "a pickle" if pickled and first != SAVED else "a checkpoint of weights"
+        raise ConfigError(f"is {what}, without a network: export the policy as ONNX or TorchScript "
+                          "with the program that trained it", source=path)  # fmt: skip
 
 
 def _names(path: Path) -> set[str]:

@@ -134,6 +134,8 @@ def _with_clip(said: dict[str, Any], folder: Path, source: Path) -> dict[str, An
 def _network(name: str | None, folder: Path, source: Path) -> tuple[Path, str]:
     """The policy's file, which the user must have allowed if it is code, and its digest."""
     path = whole_path(folder / name, source, "policy") if name else only_network(folder, source)
+    if is_folder(path):
+        raise ConfigError(f"is a folder, not a network: {path}", source=source, field="policy")
     if not is_file(path):
         raise ConfigError(f"no such file: {path}", source=source, field="policy")
     version = digest(path, source)  # what is missing beside it is said before onnxruntime finds it

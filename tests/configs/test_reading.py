@@ -107,7 +107,8 @@ MALFORMED = {
     "key": (f"{'k' * 500}: 1\n", "unknown field|kind"),
     "two lines": ('"a\\nb": 1\n', "unknown field|kind"),
     "set": ("!!set {a, b}\n", "must hold a mapping"),
-    "latin": (b"a: \xe9\n", "not valid YAML"),
+    "latin": (b"a: 1\nb: \xe9\n", "not valid YAML: line 2: not UTF-8"),
+    "a control": (b"\xc3\xa9: 1\n\nb: \x07\n", "not valid YAML: line 3: the character U+0007"),
 }
 
 

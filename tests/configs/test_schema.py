@@ -172,6 +172,7 @@ def test_bad_values_name_file_field_and_choices(
 @pytest.mark.parametrize(
     ("data", "field", "choices", "parts"),
     [
+        ({"gain": float("nan")}, "gain", None, ("must be a finite number, not nan",)),
         ({"gain": "x"}, "gain", None, ("a number", "'x'", "a mapping with names as keys")),
         ({"mode": "x"}, "mode", ("auto",), ("'x'", "a number")),
         ({"name": "nobody"}, None, None, ("nobody is not a name",)),
@@ -303,7 +304,7 @@ def test_resolve_lists_the_choices(tmp_path: Path, monkeypatch, name: str) -> No
     (tmp_path / "robots").mkdir()
     write(tmp_path / "robots" / "tall.yaml", "")
     monkeypatch.setattr(file_names, "files", lambda package: tmp_path)
-    problem = "unknown name" if name in ("tiny", ".") else "no file"
+    problem = {"tiny": "unknown name", ".": "folder"}.get(name, "no file")
     with refused(problem, "robots", choices=["tall"], value=repr(name)):
         resolve("robots", name)
 

@@ -1,5 +1,6 @@
 """Training a residual policy with Stable-Baselines3's PPO on the CPU."""
 
+import shlex
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,7 +14,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 
-from poise.baselines.allowance import allows
+from poise.baselines.allowance import allow_words, allows
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
@@ -74,7 +75,9 @@ def train(
     """
     out = Path(out)
     checkpoint = checkpoint_of(config, out, resume)
-    keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
+    names = (allow,) if isinstance(allow, str) else allow
+    again = ["poise", "train", "--out", str(out), "--resume", *allow_words(names)]
+    keeps(out / LAST, f"what is trained is kept in {out}; go on with: {shlex.join(again)}")
     start = None if checkpoint else first_policy(config.start_from)
     curriculum_levels(config)  # refused before anything is compiled
     torch.set_num_threads(1)

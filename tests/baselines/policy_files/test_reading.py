@@ -304,6 +304,7 @@ BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "two networks": (two_networks, ("policy: several networks", "choices: a.onnx, b.onnx")),
     "no network": (lambda f: write_yaml(f / "deploy.yaml", **lab_deploy(N)).parent,
                    ("deploy.yaml: policy: no network", ".onnx")),
+    "a folder": (lambda f: bare(f, policy="."), ("policy: is a folder, not a network",)),
     "no such network": (lambda f: bare(f, policy="lost.onnx"), ("policy: no such file", "lost")),
     "policy no text": (lambda f: bare(f, policy=3), ("own.yaml: policy: must be a path",)),
     "no name of a file": (lambda f: bare(f, policy="a\0.onnx"), ("own.yaml: policy: is no name",)),

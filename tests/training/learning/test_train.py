@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shlex
 import shutil
 import signal
 import subprocess
@@ -26,6 +27,7 @@ from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import load_agent
+from poise.training.cli.train import parse_train
 from poise.training.learning import callbacks, curriculum
 from poise.training.learning.callbacks import Progress
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
@@ -33,6 +35,7 @@ from poise.training.learning.policy import load_policy
 from poise.training.learning.policy_files import FILES, KEPT, POLICY, STATE
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import _env_seed, train
+from poise.training.running import stopping
 from poise.training.running.terminal import ProgressLines
 from tests.support.shared import finished_run, robot, tiny_config
 
@@ -105,6 +108,16 @@ def test_a_callback_of_the_user_is_called_and_changes_nothing(tmp_path):
     train(replace(tiny_config(), steps=64), tmp_path / "plain", progress=False)
     for a, b in zip(weights(out), weights(tmp_path / "plain"), strict=True):
         assert np.array_equal(a[0], b[0])
+
+
+def test_a_stop_tells_the_command_that_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(stopping, "_kept", [])
+    out = tmp_path / "my run"
+    train(replace(tiny_config(), steps=64), out, progress=False, allow="mine:Controller")
+    said = stopping.stop_message().partition("go on with: ")[2]
+    assert shlex.split(said) == ["poise", "train", "--out", str(out), "--resume",
+                                 "--allow", "mine:Controller"]  # fmt: skip
+    assert parse_train(shlex.split(said)[2:]).resume
 
 
 def test_policies_are_kept_when_told(tmp_path):

@@ -21,6 +21,7 @@ LOSSES = {
     "down": "did not get up",
     "error": "the controller raised an error",
 }
+FEET = {"slipped": "a foot slipped", "missed": "a foothold missed"}
 NUMBERS = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
 #: column of a cause → column of its size
 SIZES = {"saturated_from": "saturated_time", "foothold_time": "foothold_error",
@@ -62,7 +63,8 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
             (d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on{then}")
         )
     if d.foothold is not None and d.foothold_time is not None:
-        causes.append((d.foothold_time, f"foothold {d.foothold} by {d.foothold_error:.2f} m at "
+        what = FEET.get(d.foothold, d.foothold)
+        causes.append((d.foothold_time, f"{what} by {d.foothold_error:.2f} m at "
                                       f"{d.foothold_time:.2f} s"))  # fmt: skip
     if d.capture_left is not None:
         causes.append((d.capture_left, "capture point outside of the support for good from "
@@ -94,7 +96,7 @@ def cause(d: Diagnosis, steps: int | None) -> str:
     )
     slipped = d.foothold == "slipped" and (d.foothold_time or 0.0) <= (d.capture_left or 0.0)
     if slipped or d.foothold == "missed":  # a sole that slips later is one of a robot that falls
-        then = f"a foothold {d.foothold}"
+        then = FEET[d.foothold or ""]
     if d.loss == "not quiet":
         then = "did not come to rest"
     if d.loss == "off command":

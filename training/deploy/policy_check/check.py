@@ -21,6 +21,7 @@ from .guess import WORDS, Layout, Sizes, layouts, network_sizes
 from .proposals import (
     Tried,
     clock_is_open,
+    clocks,
     order_is_open,
     steps_missing,
     try_clocks,
@@ -147,7 +148,9 @@ def _layouts(sizes: Sizes, joints: int) -> list[Layout]:
 
 
 def _unsaid(config: PolicyFileConfig) -> tuple[str, ...]:
-    """Fields of `WORDS` that nothing says, though they are seldom as they are by default."""
+    """Fields of `WORDS` and `CLOCK` that nothing says, though they are seldom as they are by default."""
     said = {"joints" if name == "motors" else name for name in config.said}
-    open_ones = ("joints", "default", "stiffness", "damping", "action_scale")
+    open_ones = ["joints", "default", "stiffness", "damping", "action_scale"]
+    if clocks(config):
+        open_ones.append("phase")
     return tuple(name for name in open_ones if name not in said)

@@ -41,6 +41,8 @@ WORDS = {
     "observations": "the observation's terms in their order: obs_dict, observations, "
     "compute_observations, with their scales (obs_scales, ang_vel_scale) and history_length",
 }
+#: the same of a policy whose observation shows a clock
+CLOCK = {"phase": "the clock's period in seconds: gait_period, period, cycle_time"}
 
 
 @dataclass(frozen=True)

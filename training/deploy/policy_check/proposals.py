@@ -81,10 +81,13 @@ def try_clocks(robot: Robot, config: PolicyFileConfig) -> list[Tried]:
 
 def clock_is_open(config: PolicyFileConfig) -> bool:
     """Return whether a clock runs always, at rest too, and nothing says that it should."""
-    return config.phase_runs == "always" and any(
-        meaning(term) in CLOCKS and term.at_rest is None
-        for parts in config.inputs.values() for part in parts for term in part.terms
-    )  # fmt: skip
+    return config.phase_runs == "always" and any(term.at_rest is None for term in clocks(config))
+
+
+def clocks(config: PolicyFileConfig) -> list[ObservationTerm]:
+    """The terms that show a clock."""
+    return [term for parts in config.inputs.values() for part in parts for term in part.terms
+            if meaning(term) in CLOCKS]  # fmt: skip
 
 
 def _clocks(config: PolicyFileConfig) -> Iterator[tuple[str, PolicyFileConfig]]:

@@ -11,7 +11,7 @@ from poise.baselines.policy_files.refused import refused_families
 from poise.training.running.tables import text_table
 
 from .check import PolicyCheck
-from .guess import WORDS
+from .guess import CLOCK, WORDS
 from .proposals import SECONDS as TRIED
 from .standing import SECONDS, Stood
 
@@ -77,11 +77,11 @@ def print_policy_check(check: PolicyCheck, console: Console) -> None:
         taken = getattr(PolicyFileConfig(), name)
         if name == "joints":
             taken = "the robot's first joints, in its order,"
-        say(
-            f"not said: {name} ({WORDS[name]}); {taken} {'are' if name == 'joints' else 'is'} taken"
-        )
+        words = {**WORDS, **CLOCK}[name]
+        say(f"not said: {name} ({words}); {taken} {'are' if name == 'joints' else 'is'} taken")
     _say_tried(check, say)
-    say(_how(check.stood, SECONDS))
+    described = "as it is described, it " if check.proposed is not None and not check.amends else ""
+    say(described + _how(check.stood, SECONDS))
     for finding in check.findings:
         say(f"  {VERDICTS[finding.right]}: {finding.what}: {finding.text}")
     say(_verdict(check))
@@ -105,7 +105,7 @@ def _say_tried(check: PolicyCheck, say: Callable[[str], None]) -> None:
     if sum(each.stood.fell is None for each in check.tried if each.what == "history") > 1:
         say("more than one of them stands: a rollout (--rollout) tells which is right")
     if check.proposed is not None:
-        say(f"so read, {check.proposed.name}, it does best; in the description:")
+        say(f"proposed: {check.proposed.name}, which does best; in the description:")
         say(check.proposed.lines)
 
 

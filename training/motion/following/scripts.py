@@ -25,6 +25,8 @@ from poise.configs.reading import is_file
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot, load_robot
 
+CLIP_FILES = (".bvh", ".npz", ".yaml")  # that a script may name in quotes
+
 
 def open_synthesis(
     file: Path | None,
@@ -76,8 +78,9 @@ def open_synthesis(
         steps = [*walks, *motions]
     said = set() if script is None else clip_names(script)
     names += [name for name in steps if any(name == n or name.endswith(f"_{n}") for n in said)]
+    files = sorted(name for name in said if Path(name).suffix in CLIP_FILES and is_file(name))
     limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
-    loaded = load_clips(names, body)
+    loaded = [*load_clips(names, body), *load_clips(files, body, files)]
     return Synthesis(make_graph(loaded, limits, robot=robot or ""),
                      {entry.name: clip for entry, clip in loaded}, kind,
                      robot_joins=joins, others=[n for n in steps if n not in names])  # fmt: skip

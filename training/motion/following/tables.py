@@ -130,7 +130,7 @@ def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
     return [
         (
             "performed by a planner that walks",
-            f"{'a run as a walk, ' if run else ''}at {made.tempo:.2f} of the clip's speed{less}: "
+            f"{'off the ground in the clip, performed as a walk, ' if run else ''}at {made.tempo:.2f} of the clip's speed{less}: "
             f"up to {np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s "
             f"(--controller {made.walker}){other}",
         )

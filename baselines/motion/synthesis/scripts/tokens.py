@@ -56,4 +56,5 @@ def wrong(
 def _unknown(text: str, at: int, source: str) -> ConfigError:
     if text[at] == '"':
         return wrong("the quote is not closed on its line", text, at, source)
-    return wrong(f"{shown(text[at])} means nothing in a script", text, at, source, SIGNS)
+    paths = "; quote the path of a file" if text[at] in "/\\.~" else ""
+    return wrong(f"{shown(text[at])} means nothing in a script{paths}", text, at, source, SIGNS)

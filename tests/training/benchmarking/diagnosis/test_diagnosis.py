@@ -150,11 +150,11 @@ def test_words() -> None:
     assert why(found, 1.94) == (
         "fell: pelvis touched the ground at 1.94 s. Before: left_ankle_y at its torque limit from "
         "0.62 s, for 0.34 s; no solution of its QP from 0.70 s on; capture point outside of the "
-        "support for good from 0.84 s, by 0.21 m at most; foothold missed by 0.08 m at 1.12 s."
+        "support for good from 0.84 s, by 0.21 m at most; a foothold missed by 0.08 m at 1.12 s."
     )
     assert cause(found, 2) == "ankle_y at its torque limit, then a foothold missed"
     assert cause(replace(found, foothold="slipped"), 2).endswith("its steps were not enough")
-    assert cause(replace(found, foothold="slipped", foothold_time=0.7), 2).endswith("d slipped")
+    assert cause(replace(found, foothold="slipped", foothold_time=0.7), 2).endswith("a foot slipped")
     plain = replace(found, foothold=None, failures_from=None)
     assert cause(plain, 0) == "ankle_y at its torque limit, then no planned step"
     assert cause(plain, None) == "ankle_y at its torque limit"

@@ -102,6 +102,9 @@ def test_steps_are_joined_and_put_together(
     assert main([*synth, *of_robot]) == 0
     made = read_robot_clip("made.npz").planted
     assert made is not None and (~made).sum() == (~ahead_clip(robot).planted).sum()
+    monkeypatch.setattr("poise.training.motion.following.scripts.packaged_clips", list)
+    by_path = ["motion", "synth", 'step_in_place -> "ahead.npz"', "--out", "path.npz", *of_robot]
+    assert main(by_path) == 0 and read_robot_clip("path.npz").planted is not None
     assert main(["motion", "graph", "ahead.npz", "humanoid_stand", "--out", "g.yaml"]) == 2
     assert "say which robot's (--robot)" in capsys.readouterr().err
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,13 @@ def test_a_checkpoint_is_no_network(
         text = capsys.readouterr().err
         assert text.startswith(f"poise: {path}: is a checkpoint of weights"), text
         assert "export the policy as ONNX or TorchScript" in text and "--allow" not in text
+
+
+def test_a_pickle_is_no_network(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "policy.pt").write_bytes(pickle.dumps({"weights": [1.0]}))
+    check = ["policies", "check", str(tmp_path / "policy.pt"), "--robot", "compact"]
+    assert main(check) == 2
+    assert "policy.pt: is a pickle, without a network" in capsys.readouterr().err
 
 
 def test_a_bare_script_is_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -87,17 +87,27 @@ def test_no_order_stands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @pytest.mark.parametrize("term", ["phase", "phase_sin"])
-def test_a_clock_that_is_never_at_rest(tmp_path: Path, term: str) -> None:
+def test_a_clock_that_is_never_at_rest(
+    tmp_path: Path, term: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Zeros at rest are proposed; what is proposed is at rest, and says so itself."""
     leaning(tmp_path / "policy.onnx", 5, 3, "waist_roll")
     terms = [{"term": "projected_gravity"}, {"term": term}]
-    check = check_policy(described(tmp_path, terms, action_scale=0.3), robot("compact"))
+    path = described(tmp_path, terms, action_scale=0.3)
+    main(["policies", "check", path, "--robot", "compact"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "as it is described, it stood for 10 s, never at rest" in text
+    assert "clock's period in seconds" in text and "0.8 is taken" in text
+    check = check_policy(path, robot("compact"))
     assert check.stood is not None and check.stood.fell is None and not check.stood.rests
     said = proposal(check)
     assert said["observations"] == [{"term": "projected_gravity"},
                                     {"term": term, "at_rest": [0.0, 0.0]}]  # fmt: skip
     again = check_policy(described(tmp_path, action_scale=0.3, terms=[], **said), robot("compact"))
     assert again.stood is not None and again.stood.rests and again.tried == ()
+    assert check.unsaid == ("phase",)
+    told = described(tmp_path, terms, action_scale=0.3, phase=0.8)
+    assert check_policy(told, robot("compact")).unsaid == ()
 
 
 def test_metadata_says_terms_and_no_history(tmp_path: Path) -> None:

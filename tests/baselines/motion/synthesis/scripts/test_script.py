@@ -185,6 +185,8 @@ WRONG = [
      ",, {, }, =, ;)"),
     ("a &\nb", 1, 3, "'&' means nothing in a script (choices: ->, |, (, ), <, >, *, @, [, ], :, "
      ",, {, }, =, ;)"),
+    ("a -> ../b.npz", 1, 6, "'.' means nothing in a script; quote the path of a file (choices: ->, "
+     "|, (, ), <, >, *, @, [, ], :, ,, {, }, =, ;)"),
     ('a -> "b', 1, 6, "the quote is not closed on its line"),
     ('"a\n" -> b', 1, 1, "the quote is not closed on its line"),
     ('a -> ""', 1, 6, "a name is empty"),
