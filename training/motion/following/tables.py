@@ -126,11 +126,12 @@ def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
     planted = made.clip.planted
     run = planted is not None and not planted.any(axis=1).all()
     less = "" if made.stride == 1.0 else f", its steps {made.stride:.2f} of their length"
+    flies = "off the ground in the clip, performed as a walk, " if run else ""
     other = f"; its steps are not the clip's ({made.bound})" if made.bound else ""
     return [
         (
             "performed by a planner that walks",
-            f"{'off the ground in the clip, performed as a walk, ' if run else ''}at {made.tempo:.2f} of the clip's speed{less}: "
+            f"{flies}at {made.tempo:.2f} of the clip's speed{less}: "
             f"up to {np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s "
             f"(--controller {made.walker}){other}",
         )

@@ -154,7 +154,8 @@ def test_words() -> None:
     )
     assert cause(found, 2) == "ankle_y at its torque limit, then a foothold missed"
     assert cause(replace(found, foothold="slipped"), 2).endswith("its steps were not enough")
-    assert cause(replace(found, foothold="slipped", foothold_time=0.7), 2).endswith("a foot slipped")
+    early = replace(found, foothold="slipped", foothold_time=0.7)
+    assert cause(early, 2).endswith("a foot slipped")
     plain = replace(found, foothold=None, failures_from=None)
     assert cause(plain, 0) == "ankle_y at its torque limit, then no planned step"
     assert cause(plain, None) == "ankle_y at its torque limit"
