@@ -57,6 +57,10 @@ def check(
         raise ConfigError("--fit and --out go together", field="out")
     body, console = load_robot(robot), terminal()
     reference = load_motion(motion, body)
+    if reference.commands is not None:
+        raise ConfigError(f"is walked by a planner, whose steps are its own: poise motion follow "
+                          f"{motion} --controller walk performs it", source=motion,
+                          field="motion")  # fmt: skip
     judged = check_motion(reference, body)
     config = momentum_qp_config(controller) if qp else None
     if fit:

@@ -148,7 +148,7 @@ def _layouts(sizes: Sizes, joints: int) -> list[Layout]:
 
 
 def _unsaid(config: PolicyFileConfig) -> tuple[str, ...]:
-    """Fields of `WORDS` and `CLOCK` that nothing says and that are seldom as they are by default."""
+    """Fields of `WORDS` and `CLOCK` that nothing says and whose defaults seldom fit."""
     said = {"joints" if name == "motors" else name for name in config.said}
     open_ones = ["joints", "default", "stiffness", "damping", "action_scale"]
     if clocks(config):

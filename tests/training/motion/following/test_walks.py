@@ -25,6 +25,7 @@ from poise.baselines.motion.space_time.walked import find_commands, walked_clip
 from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.errors import ConfigError
+from poise.training.cli.entry import main
 from poise.training.motion.following.follow import follow
 from tests.support.captures import CAPTURES, make
 from tests.support.physics import robot_named
@@ -261,3 +262,12 @@ def test_only_what_walks_is_told_to() -> None:
     assert faster.commands[-1, 0] == pytest.approx(0.5 * reference.commands[-1, 0])
     with pytest.raises(ConfigError, match="does not walk"):
         follow(reference, "momentum-qp", starts=1)
+
+
+def test_a_walk_by_a_planner_is_not_checked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its steps are not those of the file: that is told, with the command that performs it."""
+    write_robot_clip(walking("walk"), tmp_path / "walk.npz")
+    assert main(["motion", "check", str(tmp_path / "walk.npz")]) == 2
+    assert "is walked by a planner" in capsys.readouterr().err
