@@ -234,7 +234,7 @@ class PolicyFileConfig:
     stiffness: PerJoint = field(default=40.0, metadata={"min": 0.0})
     damping: PerJoint = field(default=1.0, metadata={"min": 0.0})
     action_joints: tuple[int, ...] = field(default=(), metadata={"min": 0})
-    action_scale: float | tuple[float, ...] = 0.25
+    action_scale: float | tuple[float, ...] = field(default=0.25, metadata={"min": -1e3, "max": 1e3})
     action_offset: PerJoint | None = None
     action_clip: tuple[tuple[float, float], ...] = ()
     observations: tuple[ObservationTerm, ...] | dict[str, tuple[ObservationTerm, ...]] = ()

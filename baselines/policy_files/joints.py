@@ -12,6 +12,7 @@ from poise.envs.robots.robot import Robot
 
 from .config import Held, PerJoint, PolicyFileConfig
 
+OUTSIDE = 1.0  # [rad] from a joint's range: none of the known policies is near
 IMAGE = np.array([1.0, 1.0, -1.0, -1.0])  # of θ, ω_y, φ, ω_x when left and right are exchanged
 
 
@@ -50,6 +51,7 @@ def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
     if max(places, default=0) >= n or len(set(places)) < len(places):
         raise _wrong(config, "action_joints", f"must be different places in {n} joints")
     default = _spread(config.default, names, "default", config)
+    _check_posture(default, index, robot, config)
     na, moved, offset = len(places), index[places], default[places]
     if config.action_offset is not None:
         offset = _spread(config.action_offset, [names[i] for i in places], "action_offset", config)
@@ -73,6 +75,19 @@ def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
     _hold(servos, robot, config)
     _obey(servos, robot, config)
     return servos
+
+
+def _check_posture(
+    default: np.ndarray, index: np.ndarray, robot: Robot, config: PolicyFileConfig
+) -> None:
+    """Raise ConfigError for a default position far outside of its joint's range."""
+    low, high = robot.joint_range[index].T
+    outside = np.maximum(low - default, default - high)
+    worst = int(np.argmax(outside)) if len(index) else 0
+    if len(index) and outside[worst] > OUTSIDE:
+        raise _wrong(config, "default", f"{default[worst]:g} rad is far outside of the range of "
+                     f"{robot.joint_names[index[worst]]}, {low[worst]:.2f} to {high[worst]:.2f} "
+                     "rad: degrees, or another order of joints")  # fmt: skip
 
 
 def _obey(servos: JointServos, robot: Robot, config: PolicyFileConfig) -> None:

@@ -87,7 +87,12 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     if is_plugin(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
     config = controller_config(name)
-    env = ResidualBalanceEnv(robot, controller=config, **overrides)
+    try:
+        env = ResidualBalanceEnv(robot, controller=config, **overrides)
+    except ConfigError as error:
+        if error.field != "controller period":
+            raise
+        raise ConfigError(error.message, source=name, field="period") from None
     return _idle(name, env, to_yaml(_wherever(config)) + _stand_in(config))
 
 

@@ -68,6 +68,14 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     assert name in str(error.value)
 
 
+def test_a_period_that_does_not_fit_names_its_file(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text("base: momentum-qp\nperiod: 0.0033\n")
+    with pytest.raises(ConfigError, match="is not a whole number of steps") as caught:
+        load_agent(str(path), robot)
+    assert (caught.value.source, caught.value.field) == (str(path), "period")
+
+
 def test_a_folder_without_a_policy_is_refused(robot: Robot, tmp_path: Path) -> None:
     """An existing folder is taken for a policy; its missing file is named."""
     with pytest.raises(ConfigError, match="a policy folder holds"):
