@@ -11,6 +11,8 @@ from .motion.config import MotionConfig
 #: one number for all joints, one for each in the policy's order, or by the joints' names
 PerJoint = float | tuple[float, ...] | dict[str, float]
 
+SCALES = {"min": -1e3, "max": 1e3}  # of an action, in rad
+
 #: what an output may be: the action, and gains that come with it
 ROLES = ("action", "stiffness", "damping")
 
@@ -234,7 +236,7 @@ class PolicyFileConfig:
     stiffness: PerJoint = field(default=40.0, metadata={"min": 0.0})
     damping: PerJoint = field(default=1.0, metadata={"min": 0.0})
     action_joints: tuple[int, ...] = field(default=(), metadata={"min": 0})
-    action_scale: float | tuple[float, ...] = field(default=0.25, metadata={"min": -1e3, "max": 1e3})
+    action_scale: float | tuple[float, ...] = field(default=0.25, metadata=SCALES)
     action_offset: PerJoint | None = None
     action_clip: tuple[tuple[float, float], ...] = ()
     observations: tuple[ObservationTerm, ...] | dict[str, tuple[ObservationTerm, ...]] = ()

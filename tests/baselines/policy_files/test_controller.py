@@ -318,7 +318,7 @@ def test_a_simulation_that_diverged_is_a_fall(robot: Robot, own: Path) -> None:
         ({"joints": [], "default": 0.1, "stiffness": 40.0, "damping": 1.0, "action_scale": 0.1},
          ("joints: is not given", "left_knee")),
         ({"default": [0.1, 0.2]}, ("default: has 2 numbers for 23 joints",)),
-        ({"default": {"*_knee*": 17.0, "*": 0.0}}, ("default: 17 rad is far outside of the range",)),
+        ({"default": {"*_knee*": 17.0, "*": 0.0}}, ("default: 17 rad is far outside of the",)),
         ({"action_scale": 1e300}, ("action_scale: must be at most 1000",)),
         ({"stiffness": {"*_knee*": 3.0}}, ("stiffness: has nothing for", "ankle")),
         ({"stiffness": {"*_tail": 3.0}}, ("stiffness: no joint is called '*_tail'", "choices")),
