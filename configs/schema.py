@@ -82,8 +82,9 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
     is converted. A number must be finite. ``field(metadata={"min": 0, "max": 1, "above": 0})``
     bounds a number (min and max inclusive, above exclusive), or each number of a tuple, list or
     dict. A ValueError of ``__post_init__`` becomes a ConfigError. A class variable ``RENAMED``
-    maps the old name of a field to its name: an error of the old one says the new one. A dataclass
-    with a static method ``named`` may be given by a name, which that takes.
+    maps the old name of a field to its name: an error of the old one says the new one. A field with
+    ``metadata={"filled": True}`` is filled in by code, and no choice in an error. A dataclass with
+    a static method ``named`` may be given by a name, which that takes.
 
     Args:
         cls: the dataclass.
@@ -206,13 +207,14 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
             "type", source, path, fields, expected="a mapping of fields", value=shown(data)
         )
     prefix = f"{path}." if path else ""
+    own = [name for name, field in fields.items() if not field.metadata.get("filled")]
     renamed = getattr(cls, "RENAMED", {})
     for key in data:
         if key in renamed and key not in fields:
             raise Problem("renamed", source, f"{prefix}{key}", name=shown(renamed[key]))
         if key not in fields:
-            hint = meant(key, fields)
-            raise Problem("unknown field", source, f"{prefix}{key}", fields, hint=hint)
+            hint = meant(key, own)
+            raise Problem("unknown field", source, f"{prefix}{key}", own, hint=hint)
     hints = get_type_hints(cls)
     values = {}
     for name, field in fields.items():

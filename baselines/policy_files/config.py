@@ -245,9 +245,11 @@ class PolicyFileConfig:
     phase: float = field(default=0.8, metadata={"above": 0.0})
     policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})
     hold: float = field(default=15.0, metadata={"min": 0.0, "max": 200.0})
-    digest: str = ""
-    described_in: str = field(default="", compare=False)
-    said: tuple[str, ...] = field(default=(), compare=False, metadata={"omit": "default"})
+    digest: str = field(default="", metadata={"filled": True})
+    described_in: str = field(default="", compare=False, metadata={"filled": True})
+    said: tuple[str, ...] = field(
+        default=(), compare=False, metadata={"omit": "default", "filled": True}
+    )
     origin: Origin | None = field(default=None, metadata={"omit": "default"}, compare=False)
     held: tuple[float, ...] | dict[str, float | Held] | None = field(
         default=None, metadata={"omit": "default"}

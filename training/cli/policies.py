@@ -1,5 +1,6 @@
 """`poise policies`: those of others, known and checked; policies, and what they do, written."""
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -45,7 +46,8 @@ def check(
     from poise.training.deploy.policy_check.tables import print_policy_check
 
     with allowing(allow):
-        found = check_policy(file, load_robot(robot), rollout)
+        found = check_policy(file, load_robot(robot), rollout,
+                             lambda line: print(f"poise: {line}", file=sys.stderr))  # fmt: skip
     print_policy_check(found, terminal())
     return 0 if found.right else 1
 

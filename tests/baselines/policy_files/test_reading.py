@@ -418,3 +418,13 @@ def test_torchscript_forgets_and_is_copied(script: Path) -> None:
     assert kind(*arguments).act(seen)["action"][0] == 3.0 == network.act(seen)["action"][0]
     network.reset()
     assert network.act(seen)["action"][0] == 1.0
+
+
+def test_what_code_fills_in_is_no_choice(tmp_path: Path) -> None:
+    write_onnx(tmp_path / "policy.onnx", linear(3, 3))
+    write_yaml(tmp_path / "own.yaml", kind="policy-file", policy="policy.onnx", stifness=1.0)
+    with pytest.raises(ConfigError) as caught:
+        controller_config(tmp_path / "own.yaml")
+    choices = set(caught.value.choices or ())
+    assert caught.value.field == "stifness" and "stiffness" in choices
+    assert not choices & {"digest", "described_in", "said"}

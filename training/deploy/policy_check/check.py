@@ -19,16 +19,18 @@ from poise.envs.robots.robot import Robot
 
 from .guess import WORDS, Layout, Sizes, layouts, network_sizes
 from .proposals import (
+    Say,
     Tried,
     clock_is_open,
     clocks,
     order_is_open,
+    silent,
     steps_missing,
     try_clocks,
     try_histories,
 )
 from .rollout import Finding, compare_rollout
-from .standing import Stood, stand
+from .standing import SECONDS, Stood, stand
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,13 @@ class PolicyCheck:
         return stands and all(each.right is not False for each in self.findings)
 
 
-def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> PolicyCheck:
+def check_policy(
+    file: str, robot: Robot, rollout: Path | None = None, say: Say = silent
+) -> PolicyCheck:
     """Check a policy: a network, or whatever `controller_config` takes for one.
 
-    A network without a description is not run: what a description needs is reported.
+    A network without a description is not run: what a description needs is reported. `say` is told
+    of each trial before it.
 
     Raises ConfigError, which names the field, for a file that is no policy or a wrong description.
     """
@@ -92,18 +97,19 @@ def check_policy(file: str, robot: Robot, rollout: Path | None = None) -> Policy
         raise ConfigError("is no external policy", source=file, field="policy")
     sizes = network_sizes(Path(config.policy))
     steps = steps_missing(robot, config, sizes)
-    tried = try_histories(robot, config, steps) if steps > 1 else []
+    tried = try_histories(robot, config, steps, say) if steps > 1 else []
     proposed = max(tried, key=lambda each: each.stood.rank, default=None)
     if proposed is not None:
         config = proposed.config
     policy = PolicyFile(robot, config)
     findings = () if rollout is None else compare_rollout(policy, rollout)
+    say(f"standing for {SECONDS:g} s")
     stood = stand(robot, config)
     if steps == 1:
         if stood.fell is not None and order_is_open(config):
-            tried += try_histories(robot, config, 1)
+            tried += try_histories(robot, config, 1, say)
         if not stood.rests and clock_is_open(config):
-            tried += try_clocks(robot, config)
+            tried += try_clocks(robot, config, say)
         proposed = _better(tried, stood)
     return PolicyCheck(file, known, sizes, (), _unsaid(config), stood, tuple(findings),
                        tuple(tried), proposed, steps > 1, _holds(config))  # fmt: skip

@@ -1,8 +1,8 @@
 """What a description leaves open, tried: how a history lies, and what a clock shows at rest."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
 from poise.baselines.policy_files.controller import observer_of
@@ -13,7 +13,12 @@ from poise.envs.robots.robot import Robot
 from .guess import LONGEST, Sizes
 from .standing import Stood, stand
 
+Say: TypeAlias = Callable[[str], object]  # progress, a line at a time
 SECONDS = 5.0  # of a trial: what is read in a wrong order falls within one
+
+
+def silent(line: str) -> None:
+    """No progress."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +54,14 @@ def steps_missing(robot: Robot, config: PolicyFileConfig, sizes: Sizes) -> int:
     return steps if not rest and 1 < steps <= LONGEST else 1
 
 
-def try_histories(robot: Robot, config: PolicyFileConfig, steps: int) -> list[Tried]:
+def try_histories(
+    robot: Robot, config: PolicyFileConfig, steps: int, say: Say = silent
+) -> list[Tried]:
     """Let the policy stand with its history in each order: by frame or term, either end first.
 
     Args:
         steps: of the history; 1 where the terms say theirs.
+        say: what is told of each trial before it.
     """
     found = []
     orders: tuple[Literal["frame", "term"], ...] = ("frame", "term")
@@ -64,7 +72,7 @@ def try_histories(robot: Robot, config: PolicyFileConfig, steps: int) -> list[Tr
                 for part in config.inputs[""]
             )
             tried = replace(config, history=history, observations=parts)
-            found.append(_tried("history", f"by {history}, {end}", robot, tried))
+            found.append(_tried("history", f"by {history}, {end}", robot, tried, say))
     return found
 
 
@@ -74,9 +82,9 @@ def order_is_open(config: PolicyFileConfig) -> bool:
     return "history" not in config.said and any(part.history > 1 and part.term for part in parts)
 
 
-def try_clocks(robot: Robot, config: PolicyFileConfig) -> list[Tried]:
+def try_clocks(robot: Robot, config: PolicyFileConfig, say: Say = silent) -> list[Tried]:
     """Let a policy stand whose clock shows something else while no velocity is commanded."""
-    return [_tried("clock", name, robot, changed) for name, changed in _clocks(config)]
+    return [_tried("clock", name, robot, changed, say) for name, changed in _clocks(config)]
 
 
 def clock_is_open(config: PolicyFileConfig) -> bool:
@@ -115,7 +123,8 @@ def _resting(part: ObservationTerm, shown: dict[str, tuple[float, ...]]) -> Obse
     return replace(part, at_rest=tuple(values[i] for i in part.pick or range(len(values))))
 
 
-def _tried(what: str, name: str, robot: Robot, config: PolicyFileConfig) -> Tried:
+def _tried(what: str, name: str, robot: Robot, config: PolicyFileConfig, say: Say) -> Tried:
+    say(f"trying its {what}, {name}: {SECONDS:g} s")
     return Tried(what, name, config, stand(robot, config, SECONDS), _lines(config))
 
 

@@ -62,8 +62,10 @@ def test_a_history_that_nothing_says_is_tried(
     said = proposal(check)
     assert said["history"] == "frame" and all(t["history"] == 4 for t in said["observations"])
     assert main(["policies", "check", path, "--robot", "compact"]) == 1
-    text = capsys.readouterr().out.replace("\n", " ")
+    printed = capsys.readouterr()
+    text = printed.out.replace("\n", " ")
     assert "its own description does not fit its network" in text and "history: frame" in text
+    assert printed.err.count("trying its history, ") == 4 and "standing for 10 s" in printed.err
     assert check_policy(described(tmp_path, **{"terms": [], **said}), robot("compact")).right
 
 
