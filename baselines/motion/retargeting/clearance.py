@@ -10,6 +10,7 @@ import numpy as np
 from poise.envs.robots.robot import Robot
 
 FLOOR = 0.03  # [m] kept from the floor: what touches it has fallen
+SHARE = 0.5  # of the distance to the floor of what stands nearer than that
 APART = 0.01  # [m] kept between links
 NEAR = 0.03  # [m] beyond what is kept, within which a pair is looked at
 GAIN = 0.5  # of what a pair may approach, or is to part, in one step
@@ -27,8 +28,8 @@ class GeometryPair(NamedTuple):
 class ClearanceLimit(mink.Limit):
     """−∂d/∂q Δq ≤ γ (d − d₀) for every pair of geometries at a distance d < d₀ + 3 cm.
 
-    d₀ is 3 cm to the floor and 1 cm between links, or what the standing posture has, if that is
-    less. Pairs are those that collide in the simulation, but for the soles and the floor. Unlike
+    d₀ is 3 cm to the floor and 1 cm between links. What is nearer in the standing posture keeps
+    half of its distance to the floor, all of it to another link. Pairs are those that collide in the simulation, but for the soles and the floor. Unlike
     mink's own limit it also parts what is too near already.
     """
 
@@ -111,6 +112,8 @@ def find_pairs(robot: Robot, data: mujoco.MjData) -> tuple[GeometryPair, ...]:
         kept = FLOOR if floor else APART
         now = mujoco.mj_geomDistance(model, data, first, second, kept, ends)
         if now > 0.0:  # links that overlap as they stand are drawn so
+            if floor and now < kept:  # an ankle just above its sole: it may roll
+                kept = SHARE * now
             found.append(GeometryPair(first, second, float(min(kept, now))))
     return tuple(found)
 

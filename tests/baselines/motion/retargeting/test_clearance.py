@@ -7,6 +7,7 @@ import pytest
 
 from poise.baselines.motion.retargeting.clearance import APART, FLOOR, ClearanceLimit
 from tests.support.physics import robot_named
+from tests.support.shared import robot
 
 
 def limit_at(
@@ -71,3 +72,18 @@ def test_what_has_met_is_parted() -> None:
         configuration.integrate_inplace(step, 1.0)
     assert limit.depth(configuration.data) == 0.0
     assert limit.lacking(configuration.data).max(initial=0.0) < APART
+
+
+def test_an_ankle_just_above_its_sole_may_roll() -> None:
+    """The links of the G1's feet stand nearer to the floor than others are to come."""
+    g1 = robot("unitree_g1")
+    data = mujoco.MjData(g1.model)
+    data.qpos[:] = g1.standing_qpos
+    mujoco.mj_kinematics(g1.model, data)
+    limit, near = ClearanceLimit(g1, data), 0
+    for pair in limit.pairs:
+        if 0 in g1.model.geom_bodyid[list(pair[:2])]:
+            distance = limit.distance(data, pair, np.empty(6))
+            assert pair.kept == FLOOR or pair.kept <= 0.6 * distance
+            near += pair.kept < FLOOR
+    assert near
