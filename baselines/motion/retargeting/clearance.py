@@ -29,8 +29,9 @@ class ClearanceLimit(mink.Limit):
     """−∂d/∂q Δq ≤ γ (d − d₀) for every pair of geometries at a distance d < d₀ + 3 cm.
 
     d₀ is 3 cm to the floor and 1 cm between links. What is nearer in the standing posture keeps
-    half of its distance to the floor, all of it to another link. Pairs are those that collide in the simulation, but for the soles and the floor. Unlike
-    mink's own limit it also parts what is too near already.
+    half of its distance to the floor, all of it to another link. Pairs are those that collide in
+    the simulation, but for the soles and the floor. Unlike mink's own limit it also parts what is
+    too near already.
     """
 
     def __init__(self, robot: Robot, data: mujoco.MjData):
