@@ -23,6 +23,7 @@ from poise.baselines.motion.retargeting.targets import (
 from poise.baselines.motion.retargeting.tasks import PointTask, SegmentTask
 from poise.configs.errors import ConfigError
 from tests.support.physics import robot_named
+from tests.support.shared import robot
 
 
 @pytest.fixture(scope="module")
@@ -142,3 +143,12 @@ def test_what_cannot_be_followed_is_said(squat: Clip) -> None:
         retarget(squat, robot, smooth=0.0)
     with pytest.raises(ConfigError, match="at least 0.23 s are needed"):
         retarget(squat.cut(0.0, 0.1), robot)
+
+
+@pytest.mark.parametrize("name", [
+    "unitree_g1", *(pytest.param(name, marks=pytest.mark.weekly) for name in (
+        "unitree_h1", "booster_t1"))])  # fmt: skip
+def test_public_robots_take_clips(name: str) -> None:
+    """With soles that stay, though the ankles of the G1 are just above the floor."""
+    made = retarget(read_bvh(find_bvh("humanoid_wave")).clip.cut(0.0, 2.0), robot(name))
+    assert made.sole_error < 1e-3 and made.limit_excess == 0.0 and made.penetration < 1e-3
