@@ -75,8 +75,8 @@ def check_policy(
 ) -> PolicyCheck:
     """Check a policy: a network, or whatever `controller_config` takes for one.
 
-    A network without a description is not run: what a description needs is reported. `say` is told
-    of each trial before it.
+    A network without a description is not run: what a description needs is reported. `say` takes a
+    line before each trial.
 
     Raises ConfigError, which names the field, for a file that is no policy or a wrong description.
     """

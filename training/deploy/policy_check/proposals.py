@@ -61,7 +61,7 @@ def try_histories(
 
     Args:
         steps: of the history; 1 where the terms say theirs.
-        say: what is told of each trial before it.
+        say: takes a line before each trial.
     """
     found = []
     orders: tuple[Literal["frame", "term"], ...] = ("frame", "term")
