@@ -1,16 +1,13 @@
 """A law of attitude on a walker of joint servos, searched by whole trials, folded into its weights.
 
-    a = f ∘ μ(õ) + L z,   z = (ω_x, ω_y, ω_z, g_x, g_y) of the newest frame
-    c̃ = c + C z           in each frame of the history, with that frame's z
+    a = f ∘ μ(o) + L z,   z = (ω_x, ω_y, ω_z, g_x, g_y) of the newest frame
 
-μ is the mean of the policy, ω the gyro's rate over √(g/h), g the direction of gravity, c the
-velocity command as it is observed, f (na,) a factor for each joint, L (na, 5), C (2, 5). The right
-side is the mirror image of the left.
+μ is the mean of the policy, ω the gyro's rate over √(g/h), g the direction of gravity, f (na,) a
+factor for each joint, L (na, 5). The right side is the mirror image of the left.
 
     python -m tests.performance.attitude_law search even out/even --policy OLD --spread 0.7
     python -m tests.performance.attitude_law search ideal out/ideal --policy OLD \\
         --start out/even/7.txt
-    python -m tests.performance.attitude_law search standing out/standing --policy velocity-g1
     python -m tests.performance.attitude_law compare NUMBERS --policy OLD
     python -m tests.performance.attitude_law fold NUMBERS NEW --policy OLD
 
@@ -25,18 +22,16 @@ docs/log/walking.md#a-law-of-attitude-on-velocity-g1-2026-11-30.
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cma
 import numpy as np
 import torch
 
-from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.robots.robot import load_robot
 from poise.training.learning import checkpoints, train
@@ -58,11 +53,7 @@ ROWS = (
     + [(15, gain) for gain in ("f", "gx", "y")]  # shoulder pitch
     + [(16, gain) for gain in ("f", "gy", "x")]  # shoulder roll
 )
-#: (axis of the command, gain, step of 1 with its sign), searched where the mix stands
-COMMANDS = ((0, "gx", 0.8), (0, "y", 0.4), (1, "gy", 0.8), (1, "x", -0.4))
-#: J50 by direction, of which the pushes of `share` are shares
-KNOWN = Path("docs/results/unitree_g1-velocity.json")
-#: level, kick [m/s], push [N·s] or share, least, largest, speed ahead [m/s], how many
+#: level, kick [m/s] or push [N·s], least, largest, speed ahead [m/s], how many
 MIXES: dict[str, list[tuple[str, str, float, float, float, int]]] = {
     "even": [
         ("field", "kick", 2.5, 3.8, 0.5, 11), ("field", "push", 38, 56, 0.5, 7),
@@ -77,37 +68,15 @@ MIXES: dict[str, list[tuple[str, str, float, float, float, int]]] = {
         ("field", "kick", 2.6, 3.8, 0.5, 6), ("field", "push", 40, 56, 0.5, 4),
         ("late", "kick", 3.3, 4.4, 0.5, 4),
     ],
-    "standing": [
-        ("ideal", "share", 0.82, 1.18, 0.0, 34), ("field", "share", 0.7, 1.0, 0.0, 4),
-        ("late", "share", 0.85, 1.1, 0.0, 2),
-    ],
 }  # fmt: skip
 
 
-class Law(NamedTuple):
-    """f, L and C."""
-
-    factor: np.ndarray
-    attitude: np.ndarray
-    command: np.ndarray
-
-    def of_command(self, seen: np.ndarray, frame: int, axes: int) -> np.ndarray:
-        """õ of observations (n, no) in frames so large, whose commands begin at `axes`."""
-        seen = seen.copy()
-        for at in range(0, seen.shape[1], frame):
-            seen[:, at + axes : at + axes + 2] += seen[:, at : at + 5] @ self.command.T
-        return seen
-
-
-def law_of(numbers: np.ndarray, policy: Policy) -> Law:
-    """The law of numbers; what `ROWS` and `COMMANDS` leave out is 1 and 0."""
+def law_of(numbers: np.ndarray, policy: Policy) -> tuple[np.ndarray, np.ndarray]:
+    """f (na,) and L (na, 5); what `ROWS` leave out is 1 and 0."""
     assert policy.mirrors is not None
     done = policy.mirrors[1]
     f, law = np.ones(len(done.order)), np.zeros((len(done.order), 5))
-    command = np.zeros((2, 5))
-    for number, (axis, gain, size) in zip(numbers[len(ROWS) :], COMMANDS, strict=False):
-        command[axis, COLUMNS[gain]] = size * number
-    for number, (j, gain) in zip(numbers, ROWS, strict=False):
+    for number, (j, gain) in zip(numbers, ROWS, strict=True):
         if gain == "f":
             f[j] += SIZES[gain] * number
         else:
@@ -118,7 +87,7 @@ def law_of(numbers: np.ndarray, policy: Policy) -> Law:
     law[right] = image[right]
     for j in MIDDLE:
         law[j] = 0.5 * (law[j] + image[j])
-    return Law(f, law, command)
+    return f, law
 
 
 def mean_action(policy: Policy, seen: np.ndarray) -> np.ndarray:
@@ -129,21 +98,6 @@ def mean_action(policy: Policy, seen: np.ndarray) -> np.ndarray:
     return 0.5 * (policy._mean_action(seen) + image)
 
 
-def acted(law: Law, policy: Policy, seen: np.ndarray, frame: int, axes: int) -> np.ndarray:
-    """f ∘ μ(õ) + L z (n, na)."""
-    newest = seen[:, seen.shape[1] - frame :][:, :5]
-    mean = mean_action(policy, law.of_command(seen, frame, axes))
-    return law.factor * mean + newest @ law.attitude.T
-
-
-def frame_of(policy: Policy, env: BalanceEnv) -> tuple[int, int]:
-    """Numbers of a frame of the history, and where its velocity command begins."""
-    sizes = {term.name: term.size for term in env._newest}
-    names = list(sizes)
-    before = names[: names.index("command_velocity")]
-    return sum(sizes.values()), sum(sizes[name] for name in before)
-
-
 class Trials:
     """The trials of a mix, stepped together."""
 
@@ -152,11 +106,8 @@ class Trials:
         self.rows = [row[:5] for row in MIXES[mix] for _ in range(row[5])]
         self.batch = EnvBatch([self.policy.make_env(duration=9.0, pushes=None, realism=level)
                                for level, *_ in self.rows])  # fmt: skip
-        found = json.loads(KNOWN.read_text())["controllers"]["velocity-g1"]["directions"]
-        self.known = ([row["direction"] for row in found] + [360.0],
-                      [row["j50"] for row in [*found, found[0]]])  # fmt: skip
         self.period = self.batch.envs[0].config.policy_period
-        self.frame, self.axes = frame_of(self.policy, self.batch.envs[0])
+        self.newest = len(self.policy.mean) - sum(t.size for t in self.batch.envs[0]._newest)
 
     def draw(self, seed: int) -> tuple[list[dict[str, Any]], np.ndarray]:
         options, starts = [], []
@@ -164,8 +115,6 @@ class Trials:
             rng = np.random.default_rng([seed, i])
             size, direction = rng.uniform(low, high), rng.uniform(0.0, 360.0)
             start = (1.5 if ahead else 0.6) + rng.uniform(0.0, 0.6)
-            if kind == "share":
-                size *= np.interp(direction, *self.known)
             push: dict[str, Any] = {"direction": direction, "start": start}
             if kind == "kick":
                 push["delta_v"] = size
@@ -177,14 +126,15 @@ class Trials:
 
     def play(self, numbers: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """What each trial is worth, and who did not fall."""
-        law = law_of(numbers, self.policy)
+        f, law = law_of(numbers, self.policy)
         options, starts = self.draw(seed)
         count, batch = len(starts), self.batch
         batch.reset([1000 * seed + i for i in range(count)], options)
         ends, live = np.full(count, np.inf), np.ones(count, dtype=bool)
         for step in range(1, int((starts.max() + AFTER) / self.period) + 1):
             seen = batch.observations
-            action = acted(law, self.policy, seen, self.frame, self.axes)
+            action = f * mean_action(self.policy, seen)
+            action += seen[:, self.newest : self.newest + 5] @ law.T
             batch.advance(np.clip(action, -1.0, 1.0), batch.ended)  # who fell begins anew
             fell = live & batch.ended
             ends[fell], live[fell] = step * self.period, False
@@ -219,20 +169,13 @@ def compare(trials: Trials, numbers: np.ndarray, seed: int, batches: int) -> Non
               f"lost {(a & ~b).sum()}")  # fmt: skip
 
 
-def fold(numbers: np.ndarray, name: str, frame: int, axes: int, out: Path) -> None:
+def fold(numbers: np.ndarray, name: str, newest: int, out: Path) -> None:
     policy, source = load_policy(name), locate_policy(name)
-    factor, attitude, command = law = law_of(numbers, policy)
-    mean, scale, newest = policy.mean, policy.scale, len(policy.mean) - frame
+    f, law = law_of(numbers, policy)
+    mean, scale = policy.mean[newest : newest + 5], policy.scale[newest : newest + 5]
     weights = {
         key: value.clone() for key, value in read_parameters(source / POLICY)["policy"].items()
     }
-    first, bias = (weights[f"mlp_extractor.policy_net.0.{part}"] for part in ("weight", "bias"))
-    for at in range(0, len(mean), frame):
-        z, c = slice(at, at + 5), slice(at + axes, at + axes + 2)
-        gains = torch.tensor(scale[c, None] * command, dtype=torch.float32)  # of what is observed
-        moved = first[:, c].clone()
-        bias += moved @ gains @ torch.tensor(mean[z], dtype=torch.float32)
-        first[:, z] += moved @ (gains / torch.tensor(scale[z], dtype=torch.float32))
     for layer in range(0, 2 * (len(policy.layers) - 1), 2):
         key = f"mlp_extractor.policy_net.{layer}"
         weight, bias = weights[f"{key}.weight"], weights[f"{key}.bias"]
@@ -240,19 +183,16 @@ def fold(numbers: np.ndarray, name: str, frame: int, axes: int, out: Path) -> No
         more = 5 if layer else 0
         wide, shift = torch.zeros(rows + 5, columns + more), torch.zeros(rows + 5)
         wide[:rows, :columns], shift[:rows] = weight, bias
-        place = columns if layer else newest
-        wide[rows:, place : place + 5] = torch.eye(5)
+        first = columns if layer else newest
+        wide[rows:, first : first + 5] = torch.eye(5)
         shift[rows:] = 0.0 if layer else policy.clip  # so that what passes is not negative
         weights[f"{key}.weight"], weights[f"{key}.bias"] = wide, shift
-    mean, scale = mean[newest : newest + 5], scale[newest : newest + 5]
-    passed = torch.tensor(attitude / scale, dtype=torch.float32)
-    offset = attitude @ mean - policy.clip * (attitude / scale).sum(1)
-    factors = torch.tensor(factor, dtype=torch.float32)
+    factor = torch.tensor(f, dtype=torch.float32)
+    passed = torch.tensor(law / scale, dtype=torch.float32)
+    offset = torch.tensor(law @ mean - policy.clip * (law / scale).sum(1), dtype=torch.float32)
     head = weights["action_net.weight"]
-    weights["action_net.weight"] = torch.cat([head * factors[:, None], passed], 1)
-    weights["action_net.bias"] = weights["action_net.bias"] * factors + torch.tensor(
-        offset, dtype=torch.float32
-    )
+    weights["action_net.weight"] = torch.cat([head * factor[:, None], passed], 1)
+    weights["action_net.bias"] = weights["action_net.bias"] * factor + offset
     ppo = replace(policy.config.ppo, net_arch=tuple(n + 5 for n in policy.config.ppo.net_arch))
     config = replace(policy.config, ppo=ppo)
     one = replace(config, ppo=replace(ppo, n_envs=1), start_from=None)
@@ -265,8 +205,9 @@ def fold(numbers: np.ndarray, name: str, frame: int, axes: int, out: Path) -> No
     for name in ("LICENSE", "NOTICE.md", "evaluations.csv"):
         shutil.copy(source / name, out / name)
     seen = 0.5 * np.random.default_rng(1).normal(size=(200, len(policy.mean)))
-    action = np.clip(acted(law, policy, seen, frame, axes), -1.0, 1.0)
-    print(f"{out}: differs by {np.abs(load_policy(out).act(seen) - action).max():.1e} at most")
+    action = f * mean_action(policy, seen) + seen[:, newest : newest + 5] @ law.T
+    error = np.abs(load_policy(out).act(seen) - np.clip(action, -1.0, 1.0)).max()
+    print(f"{out}: differs by {error:.1e} at most")
 
 
 def main() -> None:
@@ -283,7 +224,7 @@ def main() -> None:
     parser.add_argument("--batches", type=int, default=3)
     args = parser.parse_args()
     trials = Trials(args.what if args.task == "search" else args.mix, args.policy)
-    numbers = np.zeros(len(ROWS) + (len(COMMANDS) if args.what == "standing" else 0))
+    numbers = np.zeros(len(ROWS))
     known = args.start if args.task == "search" else Path(args.what)
     if known is not None:
         numbers = np.loadtxt(known)
@@ -292,7 +233,7 @@ def main() -> None:
     elif args.task == "compare":
         compare(trials, numbers, args.seed, args.batches)
     else:
-        fold(numbers, args.policy, trials.frame, trials.axes, args.out)
+        fold(numbers, args.policy, trials.newest, args.out)
 
 
 if __name__ == "__main__":
