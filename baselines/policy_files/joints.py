@@ -83,8 +83,8 @@ def _check_posture(
     """Raise ConfigError for a default position far outside of its joint's range."""
     low, high = robot.joint_range[index].T
     outside = np.maximum(low - default, default - high)
-    worst = int(np.argmax(outside)) if len(index) else 0
-    if len(index) and outside[worst] > OUTSIDE:
+    if np.any(outside > OUTSIDE):
+        worst = int(np.argmax(outside))
         raise _wrong(config, "default", f"{default[worst]:g} rad is far outside of the range of "
                      f"{robot.joint_names[index[worst]]}, {low[worst]:.2f} to {high[worst]:.2f} "
                      "rad: degrees, or another order of joints")  # fmt: skip

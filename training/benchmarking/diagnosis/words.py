@@ -63,9 +63,8 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
             (d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on{then}")
         )
     if d.foothold is not None and d.foothold_time is not None:
-        what = FEET.get(d.foothold, d.foothold)
-        causes.append((d.foothold_time, f"{what} by {d.foothold_error:.2f} m at "
-                                      f"{d.foothold_time:.2f} s"))  # fmt: skip
+        what, missed = FEET.get(d.foothold, d.foothold), f"{d.foothold_error:.2f} m"
+        causes.append((d.foothold_time, f"{what} by {missed} at {d.foothold_time:.2f} s"))
     if d.capture_left is not None:
         causes.append((d.capture_left, "capture point outside of the support for good from "
                      f"{d.capture_left:.2f} s, by {d.capture_outside:.2f} m at most"))  # fmt: skip
