@@ -43,6 +43,7 @@ PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard
 SCENARIO_PAGE = Path("docs/scenarios.md")
 COLUMNS = {"recovered, mix", *IN_PAIRS, *(each.heading for each in (
     J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, NOT_FALLEN, ROOT, TICK))}  # fmt: skip
+MOST_COLUMNS = 12  # controllers beside each other in a page's table of factors
 SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
 
 
@@ -190,8 +191,9 @@ def _realism(entry: Entry) -> Iterator[tuple[str, str]]:
 
 def _factors(summary: Summary) -> Table:
     """Return the recovered rates at each level: the standard's once, since its trials are those of
-    every factor, and no realism levels, which are columns of the ranking."""
-    names = summary["ranking"]
+    every factor, and no realism levels, which are columns of the ranking. The first controllers
+    only: the results have all."""
+    names = summary["ranking"][:MOST_COLUMNS]
     found = [summary["controllers"][name].get("factors", []) for name in names]
     standard: dict[tuple[str, ...], list[str]] = {}
     rows = []

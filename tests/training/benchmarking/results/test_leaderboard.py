@@ -54,3 +54,15 @@ def test_the_standard_of_all_factors_is_one_row() -> None:
     assert [row[:3] for row in rows[1:]] == [
         [factor, str(cell["level"]), f"{cell['recovered_rate']:.0%}"] for factor, cell in others
     ]
+
+
+def test_factors_of_the_first_controllers_only() -> None:
+    """Twelve columns and the two before them; the line above says how many, and of more only."""
+    results = RESULT.with_name("leaderboard.json"), RESULT
+    for result in results:
+        summary = read_summary(result)
+        page = leaderboard({str(result): summary})
+        head = next(line for line in page.splitlines() if line.startswith("| factor | level |"))
+        shown = [cell.strip(" `") for cell in head.strip("|").split("|")][2:]
+        assert shown == summary["ranking"][:12]
+        assert ("of the first 12 controllers" in page) == (len(summary["ranking"]) > 12)
