@@ -118,6 +118,11 @@ def steps_bar(label: str, console: Console | None = None) -> ProgressLines:
     return _bar(label, steps, "{task.fields[rate]}", console)
 
 
+def trials_bar(console: Console) -> Progress:
+    """Return a bar, or lines, with trials, time left and what a trial is at (field `rate`)."""
+    return _bar("trials", MofNCompleteColumn(), "{task.fields[rate]}", console)
+
+
 def _bar(label: str, count: ProgressColumn, rates: str, console: Console | None) -> ProgressLines:
     """Return a progress display; the longest column is last, where it may be cut."""
     console = console or Console()

@@ -142,6 +142,7 @@ def follow(
     from poise.training.benchmarking.trials.push_limits import load_limits
     from poise.training.motion.following.fastest import STARTS, find_fastest
     from poise.training.motion.following.follow import follow as perform
+    from poise.training.motion.following.progress import FollowProgress
     from poise.training.motion.following.tables import print_followed
     from poise.training.motion.following.tracked import follow_clip, following, tracker_config
     from poise.training.pictures.figures.encoder import check_video
@@ -174,9 +175,9 @@ def follow(
             write_motion(synthesis, script, robot, Path(motion))
         tracker = tracker_config(controller)
         if tracker is not None:
-            if fastest or waits or tempo != 1.0 or report or video:
+            if fastest or waits or tempo != 1.0 or report:
                 raise ConfigError("a tracker follows its clip at the clip's own pace: not with "
-                                  "--tempo, --waits, --fastest, --report, --video",
+                                  "--tempo, --waits, --fastest, --report",
                                   source=controller, field="controller")  # fmt: skip
             if push and share:
                 raise ConfigError("give either an impulse or a share of J50", field="share")
@@ -186,26 +187,22 @@ def follow(
             def impulse(direction: float) -> float:
                 return push if half is None else share * half(direction)
 
-            tracked = follow_clip(following(tracker, motion), body,
-                                  starts=20 if starts is None else starts, pushed=impulse,
-                                  directions=directions, seed=seed, realism=realism,
-                                  physics=physics)  # fmt: skip
-            print_followed(tracked, f"{Path(motion).stem} by {controller} on {robot}, {pushed}",
-                           terminal())  # fmt: skip
-            if out is not None:
-                write_atomic(out, json.dumps([asdict(each) for each in tracked], indent=1) + "\n")
-                print(out)
-            return 1 if any(each.fallen for each in tracked) else 0
-        if fastest:
+        elif fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return 0
         watched = Watched() if report is not None else None
         film = None if video is None else stack.enter_context(MotionFilm(video, size, watched))
-        waits_so = Tempo(waits=True) if waits else None
-        trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
-                         impulse=push, share=share, directions=directions, seed=seed, speed=tempo,
-                         tempo=waits_so, watch=film or watched, realism=realism,
-                         physics=physics)  # fmt: skip
+        count = 20 if starts is None else starts
+        watch = stack.enter_context(FollowProgress(count, terminal(stderr=True), film or watched))
+        if tracker is not None:
+            trials = follow_clip(following(tracker, motion), body, starts=count, pushed=impulse,
+                                 directions=directions, seed=seed, watch=watch, realism=realism,
+                                 physics=physics)  # fmt: skip
+        else:
+            trials = perform(motion, controller, robot=robot, starts=count, impulse=push,
+                             share=share, directions=directions, seed=seed, speed=tempo,
+                             tempo=Tempo(waits=True) if waits else None, watch=watch,
+                             realism=realism, physics=physics)  # fmt: skip
         title = f"{Path(motion).stem} by {controller} on {robot}{faster}, {pushed}"
         if report is not None and watched is not None:  # while a script's motion is there
             write_performance(report, title, motion, robot, tempo, trials, watched)

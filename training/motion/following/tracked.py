@@ -28,6 +28,8 @@ from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
+from poise.training.benchmarking.trials.play import Watch
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.motion.tracking.record import AFTER, COUNTED, LAST, SETTLING
 from poise.training.motion.tracking.steps import NONE
 
@@ -70,6 +72,7 @@ def follow_clip(
     pushed: Callable[[float], float] | None = None,
     directions: int = 8,
     seed: int = 0,
+    watch: Callable[[Trial], Watch | None] | None = None,
     realism: str | Path | None = None,
     physics: str | Path | None = None,
 ) -> list[Followed]:
@@ -82,6 +85,7 @@ def follow_clip(
 
     Args:
         pushed: the impulse [N·s] of a push in a direction [deg], as in `follow`; None: none.
+        watch: as in `follow`.
         physics: the engine, by name or file; None: MuJoCo.
 
     Raises ConfigError as `PolicyFile`, for an engine that is not installed or does not hold the
@@ -106,23 +110,30 @@ def follow_clip(
         size = 0.0 if pushed is None else pushed(direction)
         if not 0.0 <= size < np.inf:
             raise out_of_range(size, field="impulse", least=0, form="g")
-        push = Push(push_bodies(robot)[0], start, PUSH_TIME, size, direction) if size else None
-        trials.append(_followed(env, track, seed + k, push))
+        push = Push(push_bodies(robot)[0], start, PUSH_TIME, size, direction)
+        trial = Trial(k, seed + k, (push,) if size else ())
+        trials.append(_followed(env, track, trial, None if watch is None else watch(trial)))
     return trials
 
 
 def _followed(
-    env: ResidualBalanceEnv, track: MotionTrack, seed: int, push: Push | None
+    env: ResidualBalanceEnv, track: MotionTrack, trial: Trial, watch: Watch | None
 ) -> Followed:
     rows, fallen = [], False
+    push = trial.pushes[0] if trial.pushes else None
     period = env.config.policy_period
     ends = track.course.clip.duration
     until = max(ends + AFTER, 0.0 if push is None else push.start + SETTLING)
     pushes = [] if push is None else [asdict(push)]
-    env.reset(seed=seed, options={"push": pushes, "qpos": _start(env, track, seed)})
+    start = _start(env, track, trial.seed)
+    env.reset(seed=trial.seed, options={"push": pushes, "qpos": start})
     reference, rest = ClipReference(env.robot, track), np.zeros(len(env.action_names))
+    if watch is not None:
+        watch(env)
     while not fallen and env.simulation.time < until - 0.5 * period:
         env.step_without_info(rest)
+        if watch is not None:
+            watch(env)
         step = round(env.simulation.time / period)
         fallen = env.fallen or reference.lies(env, step)
         if not fallen:

@@ -64,6 +64,16 @@ def test_it_follows_a_clip(tmp_path: Path) -> None:
     for trial in first:
         assert not trial.fallen and trial.joint_rms < np.radians(4.0)
         assert trial.body_error_root < 0.05 and trial.push is None
+    times: dict[int, list[float]] = {}
+    watched = follow_clip(
+        config, BODY, starts=2, seed=3,
+        watch=lambda trial: lambda env: times.setdefault(trial.number, []).append(
+            env.simulation.time),
+    )  # fmt: skip
+    assert str(watched) == str(first)
+    for seen in times.values():  # the reset and each step, until 3 s after the clip
+        assert seen[0] == 0.0 and seen[-1] == pytest.approx(4.0) and np.all(np.diff(seen) > 0.0)
+    assert list(times) == [0, 1]
     hit = follow_clip(config, BODY, starts=1, pushed=lambda direction: 60.0)
     assert hit[0].fallen and hit[0].push is not None and hit[0].push["impulse"] == 60.0
 
@@ -106,7 +116,9 @@ def test_the_command_follows_a_clip(tmp_path: Path, capsys: pytest.CaptureFixtur
         "compact",
     ]
     assert main([*args, "--starts", "1", "--seed", "3", "--out", str(out)]) == 0
-    assert "0 of 1 fell" in " ".join(capsys.readouterr().out.split())
+    said = capsys.readouterr()
+    assert "0 of 1 fell" in " ".join(said.out.split())
+    assert said.err.startswith("trials 0/1") and " 1/1 " in said.err
     assert json.loads(out.read_text())[0]["fallen"] is False
     for more, message in (
         (["--tempo", "2"], "at the clip's own pace"),
