@@ -15,6 +15,11 @@ from .reading import is_file, is_folder
 
 #: kind → suffixes that are accepted in addition to those of YAML
 OTHERS = {"robots": (".xml", ".mjcf", ".urdf")}
+#: kind → the field, or option, that names one of them
+FIELDS = {
+    "controllers": "controller", "envs": "env", "guards": "guard", "motions": "motion",
+    "policies": "policy", "rivals": "policy", "robots": "robot", "suites": "suite",
+}  # fmt: skip
 
 
 def packaged(kind: str) -> list[str]:
@@ -43,19 +48,19 @@ def resolve(kind: str, name: str | Path) -> Path:
     Raises:
         ConfigError: there is no such name or file; its text lists the packaged names.
     """
-    names = packaged(kind)
+    names, field = packaged(kind), FIELDS.get(kind, kind)
     if not isinstance(name, (str, Path)):
-        raise Problem("type", None, kind, names, expected="a name or a path", value=shown(name))
+        raise Problem("type", None, field, names, expected="a name or a path", value=shown(name))
     if str(name) in names:
         return packaged_folder(kind) / f"{name}.yaml"
     path = Path(name)
     if path.suffix.lower() in (".yaml", ".yml", *OTHERS.get(kind, ())) and is_file(path):
         return path
     if str(name) and is_folder(path):
-        raise Problem("folder", None, kind, names, value=shown(str(name)))
+        raise Problem("folder", None, field, names, value=shown(str(name)))
     problem = "no file" if path.suffix or len(path.parts) > 1 else "unknown name"
     hint = meant(name, names) or ";"
-    raise Problem(problem, None, kind, names, value=shown(str(name)), hint=hint)
+    raise Problem(problem, None, field, names, value=shown(str(name)), hint=hint)
 
 
 def write_atomic(path: str | Path, content: str | bytes) -> None:

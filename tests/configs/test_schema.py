@@ -298,15 +298,21 @@ def test_resolve_finds_packaged_names_and_paths(tmp_path: Path, monkeypatch) -> 
     assert resolve("robots", str(own)) == own
 
 
+@pytest.mark.parametrize(
+    ("kind", "field"),
+    [("robots", "robot"), ("suites", "suite"), ("policies", "policy"), ("realism", "realism")],
+)
 @pytest.mark.parametrize("name", ["tiny", "no/such.yaml", "../robots/tall", "."])
-def test_resolve_lists_the_choices(tmp_path: Path, monkeypatch, name: str) -> None:
-    """An unknown name or path is refused with the packaged names."""
-    (tmp_path / "robots").mkdir()
-    write(tmp_path / "robots" / "tall.yaml", "")
+def test_resolve_lists_the_choices(
+    tmp_path: Path, monkeypatch, name: str, kind: str, field: str
+) -> None:
+    """An unknown name or path is refused with the packaged names, and the field that takes one."""
+    (tmp_path / kind).mkdir()
+    write(tmp_path / kind / "tall.yaml", "")
     monkeypatch.setattr(file_names, "files", lambda package: tmp_path)
     problem = {"tiny": "unknown name", ".": "folder"}.get(name, "no file")
-    with refused(problem, "robots", choices=["tall"], value=repr(name)):
-        resolve("robots", name)
+    with refused(problem, field, choices=["tall"], value=repr(name)):
+        resolve(kind, name)
 
 
 def test_write_atomic_makes_folders_and_replaces(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ PUSH = "{impulse: 20, direction: 90, body: torso, start: 0.1}"
     ("args", "message"),
     [
         (["fedback-step"], "controller: no such controller: 'fedback-step'"),
-        (["zero", "--robot", "robby"], "robots: no such name: 'robby'"),
+        (["zero", "--robot", "robby"], "robot: no such name: 'robby'"),
         (["zero", "zero", "zero", "zero"], "controllers: at most 3 side by side, not 4"),
         (["zero", "zero", "--native"], "one controller is shown by --native, not 2"),
         (["zero", "--seconds", "0"], "seconds: must be above 0, not 0.0"),
@@ -50,7 +50,7 @@ PUSH = "{impulse: 20, direction: 90, body: torso, start: 0.1}"
         (["zero", "--push", "{impulse: 1, body: tail}"], "body: no body 'tail'"),
         (["zero", "--push", "["], "push: is no YAML mapping"),
         (["zero", "--push", "{delta_v: 1.0}"], "push: a kick"),
-        (["zero", "--motion", "dance"], "motions: no such name: 'dance'"),
+        (["zero", "--motion", "dance"], "motion: no such name: 'dance'"),
         (["walk", "--command", "["], "command: is no YAML mapping"),
         (["walk", "--command", "{speed: 1}"], "command: speed: unknown field"),
         (["zero", "--controllers", "zero"], "controllers: goes with --trial"),
