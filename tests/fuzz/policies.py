@@ -41,7 +41,7 @@ ARRAYS = {
     "large": lambda a: a * 0.0 + 1e308,
     "tiny": lambda a: a * 0.0 + 5e-324,
     "zero": lambda a: a * 0.0,
-    "bomb": lambda a: np.zeros(400_000_000, dtype=np.int8),
+    "bomb": lambda a: np.zeros(200_000_000, dtype=np.int8),
     "deep": lambda a: a.reshape((1,) * 30 + a.shape),
 }
 

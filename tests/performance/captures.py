@@ -3,6 +3,7 @@
     python -m tests.performance.captures                       # 15 captures, 20 starts each
     python -m tests.performance.captures walk cmu02_jump --starts 5
     python -m tests.performance.captures mine.bvh yours.bvh      # files
+    python -m tests.performance.captures --robot unitree_g1      # another robot
 
 Five of others, found by name as `poise motion import` finds them (POISE_CLIPS, see
 docs/motions.md), and the ten that `tests.support.captures` makes. Each is imported as that command
@@ -85,16 +86,16 @@ def kind_of(clip: RobotClip) -> str:
     return "steps" if clip.planted.any(axis=1).all() else "jumps"
 
 
-def judge(path: Path, starts: int, seed: int, folder: Path) -> Row:
+def judge(path: Path, starts: int, seed: int, folder: Path, robot: str) -> Row:
     """Import a capture, and perform it from disturbed starts."""
-    made: RetargetedClip = retarget_clip(read_bvh(path).clip, load_robot("humanoid"))
+    made: RetargetedClip = retarget_clip(read_bvh(path).clip, load_robot(robot))
     how, reason = kind_of(made.clip), made.clip.about.unperformed
     row = Row(path.stem, how, made.stride, made.tempo, made.flight, 1.0, 0, 0.0, reason)
     if reason:
         return row._replace(how="refused")
     file = folder / f"{path.stem}.npz"
     write_robot_clip(made.clip, file)
-    trials = follow(file, made.walker or "motion-step", starts=starts, seed=seed)
+    trials = follow(file, made.walker or "motion-step", robot=robot, starts=starts, seed=seed)
     caught = float(np.nan_to_num(np.mean([trial.interruptions for trial in trials])))
     walked = np.array([trial.walked for trial in trials])  # NaN: falls before the clip begins
     went = 1.0 if np.isnan(walked).all() else made.asked * float(np.nan_to_num(walked).mean())
@@ -123,6 +124,7 @@ def main() -> None:
     """A line for each capture as it is done, and how many meet the bar."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", help="of captures, or .bvh files; all")
+    parser.add_argument("--robot", default="humanoid")
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--seed", type=int, default=21)
     given = parser.parse_args()
@@ -139,7 +141,7 @@ def main() -> None:
               "| steps | delay | joints | |\n" + "|---" * 13 + "|")  # fmt: skip
         rows = []
         for path in [*named, *files] if given.names else paths:
-            row = judge(path, given.starts, given.seed, folder)
+            row = judge(path, given.starts, given.seed, folder, given.robot)
             rows.append(row)
             shares = (row.way, row.tempo, row.flight, row.speed, row.reached)
             figures = " | ".join(f"{share:.2f}" for share in shares)

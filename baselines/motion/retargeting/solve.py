@@ -20,6 +20,8 @@ PLANTING = 3  # iterations from near postures to planted soles
 MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames
 MOST, STEP = 10, 1e-3  # iterations, and the largest move [rad, m] that ends them
 LEAST_DAMPING, MOST_DAMPING = 1e-4, 10.0
+NEAR = 0.02  # [rad] that planting may move a joint by in any case
+CLOSE = 1e-3  # [m] by which a sole is off at most where it is planted
 SOLES = 100.0  # weight of their errors [m, rad] where steps are compared, and of lacking clearance
 
 
@@ -124,7 +126,7 @@ class FrameIk:
         for frame in range(len(targets)):
             begin = time.thread_time()
             self.tread(frame)
-            qpos[frame] = self.planted_near(wanted[frame])
+            qpos[frame] = self.nearer(qpos[frame], wanted[frame])
             times[frame] += time.thread_time() - begin
             self.frame.aim(targets, frame)
             angles.append(self.frame.angles())
@@ -167,6 +169,22 @@ class FrameIk:
             step = self._step(tasks, LEAST_DAMPING)
             self.configuration.integrate_inplace(step, 1.0)
         return self.configuration.q.copy()
+
+    def nearer(self, solved: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        """(nq,) the posture near `wanted` with planted soles, or the one that was `solved` where
+        that is nearer, or the former's soles are off their places.
+
+        Joints at their limits leave legs no room: then planting moves them far, or in vain.
+        """
+        planted = self.planted_near(wanted)
+        moved, own = (np.abs(each[7:] - wanted[7:]).max() for each in (planted, solved))
+        if moved <= max(own, NEAR) and self.sole_error() < CLOSE:
+            return planted
+        self.configuration.update(solved)
+        if self.sole_error() < CLOSE:
+            return solved
+        self.configuration.update(planted)
+        return planted
 
     def near_tasks(self) -> list[mink.Task]:
         """What keeps a posture near to the one that it is begun at."""

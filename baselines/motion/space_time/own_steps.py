@@ -21,7 +21,27 @@ ASIDE_STEP, BACK_STEP = 0.27, 0.68  # [h] that a planner steps to a side or back
 CHANGE, BEHIND = 0.03, 0.2  # [g] by which a planner's speed changes; [hω] that it may lag
 BANK = 0.07  # [g] of speed times turning rate, above which robots fall
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
-QUICKEST, SLOWEST = 0.75, 3.0  # [1/ω] of a swing
+QUICKEST = 0.75  # [1/ω] of a swing
+
+
+class WalkLimits(NamedTuple):
+    """How a robot walks by `walk` without falls, at most."""
+
+    steady: float = 0.45  # [hω]
+    swing: float = 3.0  # [1/ω]
+
+
+#: of robots that do less, by `poise walk --controller walk --robot NAME --speed V --step-time T`
+SLOWER = {
+    "booster_t1": WalkLimits(0.31),
+    "unitree_g1": WalkLimits(0.32),
+    "unitree_h1": WalkLimits(0.22, 1.2),
+}
+
+
+def limits_of_walk(robot: Robot) -> WalkLimits:
+    """Return those of a robot, by its name."""
+    return SLOWER.get(robot.name, WalkLimits())
 
 
 class OwnSteps(NamedTuple):
@@ -41,8 +61,9 @@ def own_steps(rows: np.ndarray, robot: Robot, least: float) -> OwnSteps:
     `rows` (n, 5) are the clip's commands, with the time from one touchdown to the next [s] in place
     of that of a swing.
     """
+    slower = limits_of_walk(robot).steady / WalkLimits().steady
     for far, brisk in OWN:
-        found = _within(rows, robot, max(least, SHARE), far, brisk)
+        found = _within(rows, robot, max(least, SHARE), far, slower * brisk)
         if not found.bound:
             break
     return found
@@ -74,7 +95,7 @@ def _within(rows: np.ndarray, robot: Robot, least: float, far: float, brisk: flo
         why = [f"{way:.2f} of its length, for steps of {steps}"] if way < 1.0 else []
         why += [f"{tempo:.2f} of its tempo, for its {slow}"] if tempo < 1.0 else []
         return OwnSteps(" and ".join(why))
-    if (times / tempo).max() > (slowest := (SLOWEST + BOTH) / omega):
+    if (times / tempo).max() > (slowest := (limits_of_walk(robot).swing + BOTH) / omega):
         return OwnSteps(f"a step lasts {(times / tempo).max():.2f} s: {slowest:.2f} s can")
     commands = faster(rows * [1.0, way, way, 1.0, 1.0], tempo)
     commands[:, 4] -= BOTH / omega - EARLY

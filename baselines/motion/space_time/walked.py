@@ -31,9 +31,9 @@ from .own_steps import (
     BEND,
     MOST_TURN,
     QUICKEST,
-    SLOWEST,
     TOGETHER,
     check_changes,
+    limits_of_walk,
     out_of_turn,
     own_steps,
 )
@@ -42,7 +42,7 @@ FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, t
 STRIDE = 0.6  # [s] without a foot on the ground: longer is no run
 LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST, LEARNED = "walk", "walk-fast", "residual-walk-fast"  # controllers, a policy
-STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by the controllers: faster, robots fall
+FASTEST = 0.585  # [hω] of a walk by the fast controllers: faster, robots fall
 REACHES = 0.47  # [hω] that `walk-fast` reaches, whatever the command
 ASKED = 1.06  # largest commanded speed over the clip's: the policy is slower than commanded
 FAST_ROBOTS = ("humanoid",)  # for which the others are; others fall
@@ -117,11 +117,11 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
-    fast = robot.name in FAST_ROBOTS
-    fastest = (FASTEST if fast else STEADY) * h * omega
+    fast, steady = robot.name in FAST_ROBOTS, limits_of_walk(robot).steady * h * omega
+    fastest = FASTEST * h * omega if fast else steady
     tempo = min(fastest / max(float(speed.max()), 1e-9), 1.0)
     bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity
-    brisk = speed > STEADY * h * omega
+    brisk = speed > steady
     known = brisk.any() and (np.abs(left) <= ASIDE * ahead)[brisk].all()
     sharp = tempo * tempo * bend > most or tempo * speed.max() > REACHES * h * omega
     learned = bool(fast and known and sharp)
@@ -154,8 +154,8 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
         asked = max(min(ASKED, ASKED_BANK * robot.units.gravity / max(bent, 1e-9)), 1.0)
         commands[:, 1:3] *= asked
         return Walked(commands, tempo, LEARNED, asked, 1.0, stances, bound)
-    commands[:, 4] = _swings(commands, h, omega)
-    quick = np.hypot(commands[:, 1], commands[:, 2]).max() > STEADY * h * omega
+    commands[:, 4] = _swings(commands, robot)
+    quick = np.hypot(commands[:, 1], commands[:, 2]).max() > steady + 1e-9
     walker = WALK_FAST if quick else WALK
     return Walked(commands, tempo, walker, planted=stances, bound=bound)
 
@@ -180,8 +180,9 @@ def _frames(start: float, end: float) -> slice:
     return slice(first, max(round(end / RATE), first + 1))
 
 
-def _swings(commands: np.ndarray, h: float, omega: float) -> np.ndarray:
+def _swings(commands: np.ndarray, robot: Robot) -> np.ndarray:
     """(n,) the clip's times of a swing [s], quicker where steps would be too long or bend much."""
+    h, omega = robot.height_com, robot.omega
     going, aside = np.hypot(commands[:, 1], commands[:, 2]), np.abs(commands[:, 2])
     turning = np.maximum(np.abs(commands[:, 3]), 1e-9)
     limits = [ASIDE_STEP * h / np.maximum(aside, 1e-9),
@@ -190,7 +191,7 @@ def _swings(commands: np.ndarray, h: float, omega: float) -> np.ndarray:
               BEND * h * omega / np.maximum(going * turning, 1e-9),
               np.where(going > BRISK * h * omega, QUICK / omega, np.inf)]  # fmt: skip
     swing = np.minimum(commands[:, 4], np.min(limits, axis=0)) - BOTH / omega
-    return np.asarray(np.clip(swing, QUICKEST / omega, SLOWEST / omega))
+    return np.asarray(np.clip(swing, QUICKEST / omega, limits_of_walk(robot).swing / omega))
 
 
 def _run(clip: Clip, planted: np.ndarray) -> str:

@@ -22,6 +22,7 @@ from poise.baselines.motion.retargeting.targets import (
 )
 from poise.baselines.motion.retargeting.tasks import PointTask, SegmentTask
 from poise.configs.errors import ConfigError
+from tests.support.captures import make
 from tests.support.physics import robot_named
 from tests.support.shared import robot
 
@@ -152,3 +153,11 @@ def test_public_robots_take_clips(name: str) -> None:
     """With soles that stay, though the ankles of the G1 are just above the floor."""
     made = retarget(read_bvh(find_bvh("humanoid_wave")).clip.cut(0.0, 2.0), robot(name))
     assert made.sole_error < 1e-3 and made.limit_excess == 0.0 and made.penetration < 1e-3
+
+
+def test_legs_without_room_stay_on_their_soles() -> None:
+    """A sitting clip folds the H1's hips and ankles, which only pitch, up to their limits, where
+    planting a posture anew moves it by decimetres."""
+    made = retarget(make("sit")[0].cut(1.0, 3.0), robot("unitree_h1"))
+    fastest = np.abs(np.diff(made.clip.qpos[:, 7:], axis=0)).max() / made.clip.dt
+    assert made.sole_error < 1e-3 and made.limit_excess == 0.0 and fastest < 5.0  # [rad/s]

@@ -20,6 +20,7 @@ from poise.baselines.balance.references.robot_clip import (
 from poise.baselines.motion.clips.contacts import measure_contacts
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.baselines.motion.retargeting.retarget import retarget_freely
+from poise.baselines.motion.space_time.own_steps import limits_of_walk
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.baselines.motion.space_time.walked import find_commands, walked_clip
 from poise.baselines.registry import load_controller
@@ -165,6 +166,18 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
     assert find_commands(make("walk")[0], robot, 0.9).walker == "walk"
     other = find_commands(make("walk")[0].at_speed(1.9), robot_named("compact"), 0.9)
     assert other.walker == "walk" and other.tempo < 0.7  # whose gains are of no fast walk
+
+
+@pytest.mark.parametrize("name", ["unitree_g1", "unitree_h1", "booster_t1"])
+def test_robots_that_walk_less_are_asked_for_less(name: str) -> None:
+    """In speed and in the time of a swing, so that they do not fall."""
+    robot, clip = robot_named(name), make("walk")[0].at_speed(0.8)
+    h_omega, most = robot.height_com * robot.omega, limits_of_walk(robot)
+    commands, tempo, walker, *_ = find_commands(clip, robot, 1.0)
+    assert walker == "walk" and 0.5 < tempo < 1.0
+    assert np.hypot(commands[:, 1], commands[:, 2]).max() <= most.steady * h_omega + 1e-9
+    assert commands[:-1, 4].max() <= most.swing / robot.omega + 1e-9
+    assert most.steady < limits_of_walk(robot_named(HUMANOID)).steady
 
 
 def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
