@@ -24,7 +24,8 @@ PYTHONS ?= python3.11 python3.12 python3.13
 EXTRAS ?= torchrl rllib zoo video optuna dataset
 LOCKED ?=
 PYTEST_ARGS ?=
-PYTEST_WORKERS ?= -n auto --maxprocesses 4 --dist worksteal
+# Files stay whole: what is made once a file is made in one worker.
+PYTEST_WORKERS ?= -n auto --maxprocesses 4 --dist loadfile
 MINUTES ?= 30
 WORKERS ?= 1
 SEED ?=

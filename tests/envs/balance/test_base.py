@@ -336,7 +336,7 @@ def test_bad_options_are_refused(make, options, named):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        ({"robot": "nobody"}, ("nobody", "robots", "humanoid")),
+        ({"robot": "nobody"}, ("nobody", "robot", "humanoid")),
         ({"render_mode": "ascii"}, ("render_mode", "ascii", "rgb_array")),
         ({"duraton": 3.0}, ("unexpected keyword argument 'duraton'", "duration")),
         ({"duration": -1.0}, ("duration", "-1.0")),

@@ -34,5 +34,5 @@ def test_what_came_later_is_written_only_where_it_is_used():
 
 def test_an_unknown_name_lists_the_packaged_ones():
     """The line names what there is."""
-    with invalid("envs", "'nowhere'", "proprioceptive"):
+    with invalid("env", "'nowhere'", "proprioceptive"):
         env_config("nowhere")

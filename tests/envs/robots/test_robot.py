@@ -287,7 +287,7 @@ def test_wrong_descriptions(tmp_path: Path, change: dict, words: list[str]) -> N
 
 def test_unknown_robot_lists_names() -> None:
     """A robot that does not exist is refused with the names of those that do."""
-    with invalid("robots", "tall", "toddler", "unitree_g1"):
+    with invalid("robot", "tall", "toddler", "unitree_g1"):
         load_robot("atlas")
 
 

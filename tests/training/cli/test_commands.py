@@ -222,16 +222,16 @@ evaluate zero --workers 0 | range |  | workers |  | least=1
 evaluate zero --trials 0 | range |  | trials |  | least=1
 evaluate pid | unknown controller |  | controller | pd | value='pid'
 evaluate momentum-pq | unknown controller |  | controller | momentum-qp | value='momentum-pq'
-evaluate zero --suite rndom | unknown name |  | suites | random | value='rndom'
-evaluate zero --robot robby | unknown name |  | robots |  | value='robby'
+evaluate zero --suite rndom | unknown name |  | suite | random | value='rndom'
+evaluate zero --robot robby | unknown name |  | robot |  | value='robby'
 evaluate zero --suite bad.yaml | type | bad.yaml | random.trials |  | value='many'
 benchmark --out out --controllers pid | unknown controller |  | controller | pd | value='pid'
 benchmark --out out --suite bad.yaml | type | bad.yaml | random.trials |  | value='many'
 train --out run --config nothing | unknown name |  | training |  | value='nothing'
 train --out run --seed 1 --ppo.gamma 2 | range | command line | ppo.gamma |  | most=1.0; value=2.0
 train --out run --config bad.yaml | unknown field | bad.yaml | random |  |
-tune --out run --controller pid | unknown name |  | controllers | pd | value='pid'
-robot robby | unknown name |  | robots |  | value='robby'
+tune --out run --controller pid | unknown name |  | controller | pd | value='pid'
+robot robby | unknown name |  | robot |  | value='robby'
 walk --speed nan | type | command | ahead |  | expected=a finite number; value=nan
 walk --step-time 9 | range | command | step_time |  | most=5.0; value=9.0
 walk --push 9@999 | range | push | direction |  | most=360.0; value=999.0
@@ -243,25 +243,25 @@ walk --controller wlk | unknown controller |  | controller | walk | value='wlk'
 export residul --out out | unknown policy |  | policy | residual | value='residul'
 view momentum-pq | unknown controller |  | controller | momentum-qp | value='momentum-pq'
 tune --out out --policy residul | unknown controller |  | controller | residual | value='residul'
-train --out out --controller pid | unknown name |  | controllers | pd | value='pid'
-train --out out --robot robby | unknown name |  | robots |  | value='robby'
+train --out out --controller pid | unknown name |  | controller | pd | value='pid'
+train --out out --robot robby | unknown name |  | robot |  | value='robby'
 evaluate zero --sede 1 | unknown option | evaluate | --sede | --seed |
 evaluate zero --suit random | unknown option | evaluate | --suit | --suite |
 evaluate zero --seed one | type | evaluate | --seed |  | expected=a whole number; value='one'
 evaluate zero --seed | no value | evaluate | --seed |  | count=1
-evaluate zero --robot g1 | unknown name |  | robots | unitree_g1 | value='g1'
-evaluate zero --robot Humanoid | unknown name |  | robots | humanoid | value='Humanoid'
+evaluate zero --robot g1 | unknown name |  | robot | unitree_g1 | value='g1'
+evaluate zero --robot Humanoid | unknown name |  | robot | humanoid | value='Humanoid'
 evaluate zero --backend slurm | choice | evaluate | --backend |  | value='slurm'
 evaluate zero random | unknown controller |  | controller |  | value='random'
 evaluate feedback_step | unknown controller |  | controller | feedback-step | value='feedback_step'
 evaluate zero -seed 1 | unknown option | evaluate | -seed | --seed |
 benchmark momentum-pq --out o | unknown controller |  | controller | momentum-qp |
-benchmark --out out --suite standart | unknown name |  | suites | standard | value='standart'
+benchmark --out out --suite standart | unknown name |  | suite | standard | value='standart'
 compare run | needs | compare |  |  | what=DIR_B
 replay run | needs | replay |  |  | what=--trial N
 replay run --trial first | type | replay | --trial |  | expected=a whole number; value='first'
 view --tril 3 | unknown option | view | --tril | --trial |
-view --robot t1 | unknown name |  | robots | booster_t1 | value='t1'
+view --robot t1 | unknown name |  | robot | booster_t1 | value='t1'
 walk --sped 1 | unknown option | walk | --sped | --speed |
 walk fast | unknown argument | walk |  |  | value='fast'
 walk --speed fast | type | walk | --speed |  | expected=a number; value='fast'
@@ -276,7 +276,7 @@ evalute zero | unknown command |  |  | evaluate | value='evalute'
 motion imprt | unknown command |  |  | import | value=motion 'imprt'
 motion info | needs | motion info |  |  | what=FILE
 --vesion | unknown option |  | --vesion | --version |
-robot g1 | unknown name |  | robots | unitree_g1 | value='g1'
+robot g1 | unknown name |  | robot | unitree_g1 | value='g1'
 """
 
 

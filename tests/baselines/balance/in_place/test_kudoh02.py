@@ -101,7 +101,7 @@ def test_kinds_are_named_in_the_error():
     """An unknown kind, and a `qp` that is not one."""
     with pytest.raises(ConfigError, match="kind.*lip-mpc"):
         load_controller({"kind": "magic"}, robot())
-    with pytest.raises(ConfigError, match="controllers.*momentum-qp"):
+    with pytest.raises(ConfigError, match="controller: .*momentum-qp"):
         load_controller({"kind": "lqr-lip", "qp": "nothing"}, robot())
     with pytest.raises(ConfigError, match="gian"):
         load_controller({"kind": "capture-point", "gian": 1.0}, robot())

@@ -267,7 +267,7 @@ def test_a_controller_that_cannot_be_loaded_is_no_trial(
     [
         ({"controllers": ["zero", "zero"]}, ("controllers", "'zero'")),
         ({"controllers": ["pid"]}, ("controller", "'pid'")),
-        ({"suite": "tiny"}, ("suites", "'tiny'", "quick")),
+        ({"suite": "tiny"}, ("suite", "'tiny'", "quick")),
         ({"seed": -1}, ("seed", "0")),
         ({"workers": 0}, ("workers", "1")),
         ({"trials": 0}, ("trials", "1")),
