@@ -125,7 +125,8 @@ def follow(
         out: a JSON file to write the trials to.
         report: a .html file for pictures of the trial with the largest error: ZMP and centre of
             pressure, errors, tempo, and the timeline of a script's motion.
-        video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost.
+        video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost, except
+            for a tracker.
         size: width and height of the video [pixels], even.
 
     Returns:
