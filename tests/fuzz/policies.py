@@ -41,7 +41,7 @@ ARRAYS = {
     "large": lambda a: a * 0.0 + 1e308,
     "tiny": lambda a: a * 0.0 + 5e-324,
     "zero": lambda a: a * 0.0,
-    "bomb": lambda a: np.zeros(200_000_000, dtype=np.int8),
+    "bomb": lambda a: np.zeros(400_000_000, dtype=np.int8),
     "deep": lambda a: a.reshape((1,) * 30 + a.shape),
 }
 
@@ -73,7 +73,10 @@ def cases(draw: Draw) -> Json:
     if how == "bomb":
         return {**case, "zeros": draw(st.sampled_from([0, 10**6, 2 * 10**8]))}
     if how == "array" and name == STATISTICS:
-        return {**case, "array": draw(st.sampled_from(sorted(ARRAYS)))}
+        case["array"] = draw(st.sampled_from(sorted(ARRAYS)))
+        if case["array"] == "bomb" and case["method"] == "lzma":
+            case["method"] = "deflated"  # else writing the case takes the seconds of a hang
+        return case
     head = draw(st.booleans())  # where formats keep what describes the rest
     return {**case, "edits": byte_edits(draw, min(size, 200) if head else size)}
 

@@ -11,6 +11,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .in_step import BOTH
+from .walk_limits import WalkLimits, limits_of_walk
 
 SHARE = 0.7  # of a clip's way times its tempo, from which its own steps are taken
 #: [h] of a step that lasts as the clip's, and [hω] of its speed, at most: less is safer
@@ -22,26 +23,6 @@ CHANGE, BEHIND = 0.03, 0.2  # [g] by which a planner's speed changes; [hω] that
 BANK = 0.07  # [g] of speed times turning rate, above which robots fall
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
 QUICKEST = 0.75  # [1/ω] of a swing
-
-
-class WalkLimits(NamedTuple):
-    """How a robot walks by `walk` without falls, at most."""
-
-    steady: float = 0.45  # [hω]
-    swing: float = 3.0  # [1/ω]
-
-
-#: of robots that do less, by `poise walk --controller walk --robot NAME --speed V --step-time T`
-SLOWER = {
-    "booster_t1": WalkLimits(0.31),
-    "unitree_g1": WalkLimits(0.32),
-    "unitree_h1": WalkLimits(0.22, 1.2),
-}
-
-
-def limits_of_walk(robot: Robot) -> WalkLimits:
-    """Return those of a robot, by its name."""
-    return SLOWER.get(robot.name, WalkLimits())
 
 
 class OwnSteps(NamedTuple):
@@ -61,7 +42,7 @@ def own_steps(rows: np.ndarray, robot: Robot, least: float) -> OwnSteps:
     `rows` (n, 5) are the clip's commands, with the time from one touchdown to the next [s] in place
     of that of a swing.
     """
-    slower = limits_of_walk(robot).steady / WalkLimits().steady
+    slower = limits_of_walk(robot).speed / WalkLimits().speed
     for far, brisk in OWN:
         found = _within(rows, robot, max(least, SHARE), far, slower * brisk)
         if not found.bound:

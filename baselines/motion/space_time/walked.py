@@ -33,10 +33,10 @@ from .own_steps import (
     QUICKEST,
     TOGETHER,
     check_changes,
-    limits_of_walk,
     out_of_turn,
     own_steps,
 )
+from .walk_limits import limits_of_walk
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 STRIDE = 0.6  # [s] without a foot on the ground: longer is no run
@@ -117,7 +117,7 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
-    fast, steady = robot.name in FAST_ROBOTS, limits_of_walk(robot).steady * h * omega
+    fast, steady = robot.name in FAST_ROBOTS, limits_of_walk(robot).speed * h * omega
     fastest = FASTEST * h * omega if fast else steady
     tempo = min(fastest / max(float(speed.max()), 1e-9), 1.0)
     bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity

@@ -182,12 +182,6 @@ def follow(
                                   source=controller, field="controller")  # fmt: skip
             if push and share:
                 raise ConfigError("give either an impulse or a share of J50", field="share")
-            body = load_robot(robot)
-            half = load_limits(body).j50() if share else None
-
-            def impulse(direction: float) -> float:
-                return push if half is None else share * half(direction)
-
         elif fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return 0
@@ -196,6 +190,12 @@ def follow(
         count = 20 if starts is None else starts
         watch = stack.enter_context(FollowProgress(count, terminal(stderr=True), film or watched))
         if tracker is not None:
+            body = load_robot(robot)
+            half = load_limits(body).j50() if share else None
+
+            def impulse(direction: float) -> float:
+                return push if half is None else share * half(direction)
+
             trials = follow_clip(following(tracker, motion), body, starts=count, pushed=impulse,
                                  directions=directions, seed=seed, watch=watch, realism=realism,
                                  physics=physics)  # fmt: skip

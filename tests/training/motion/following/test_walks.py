@@ -175,9 +175,9 @@ def test_robots_that_walk_less_are_asked_for_less(name: str) -> None:
     h_omega, most = robot.height_com * robot.omega, limits_of_walk(robot)
     commands, tempo, walker, *_ = find_commands(clip, robot, 1.0)
     assert walker == "walk" and 0.5 < tempo < 1.0
-    assert np.hypot(commands[:, 1], commands[:, 2]).max() <= most.steady * h_omega + 1e-9
+    assert np.hypot(commands[:, 1], commands[:, 2]).max() <= most.speed * h_omega + 1e-9
     assert commands[:-1, 4].max() <= most.swing / robot.omega + 1e-9
-    assert most.steady < limits_of_walk(robot_named(HUMANOID)).steady
+    assert most.speed < limits_of_walk(robot_named(HUMANOID)).speed
 
 
 def test_fast_curves_are_walked_by_the_policy_that_holds_them() -> None:
