@@ -1,6 +1,7 @@
 """Files: packaged ones by name, and files that are written whole or not at all."""
 
 import contextlib
+import functools
 import os
 import shutil
 import tempfile
@@ -28,8 +29,14 @@ def packaged(kind: str) -> list[str]:
     A configuration is a file, ``NAME.yaml``, or a folder, ``NAME/config.yaml`` (policies).
     """
     folder = packaged_folder(kind)
+    return list(_names(folder, folder.stat().st_mtime_ns)) if folder.is_dir() else []
+
+
+@functools.cache
+def _names(folder: Path, changed: int) -> tuple[str, ...]:
+    """Names in a folder as it was when it `changed` [ns]."""
     files = [path.stem for path in folder.glob("*.yaml")]
-    return sorted(files + [path.parent.name for path in folder.glob("*/config.yaml")])
+    return tuple(sorted(files + [path.parent.name for path in folder.glob("*/config.yaml")]))
 
 
 def packaged_folder(kind: str) -> Path:

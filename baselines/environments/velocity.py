@@ -12,6 +12,7 @@ from poise.baselines.controller import COMMAND_ENTRIES
 from poise.baselines.walking.admittance import QUICK_TIME, Admittance, give_way
 from poise.baselines.walking.calibration import Calibration
 from poise.baselines.walking.correction import MEAN_TIME, Correction, correct_course
+from poise.baselines.walking.evasion import AGAIN, Evasion, evade
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import (
     CommandSampler,
@@ -42,6 +43,7 @@ class VelocityStep(PositionStep):
     course: Course
     correction: Correction
     admittance: Admittance
+    evasion: Evasion
 
 
 @compiled
@@ -51,6 +53,7 @@ def velocity_step(step: VelocityStep):
     follow_course(step.course)
     correct_course(step.correction)
     give_way(step.admittance)
+    evade(step.evasion)
     end_step(step.end)
 
 
@@ -103,10 +106,12 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self.command_sampler = CommandSampler() if command is None else command_sampler(command)
         self.calibration = calibration or Calibration()
         self._calibrated = self.calibration.arrays()
+        self._evasion = np.array(self.calibration.evasion, float).reshape(-1, 2)
         self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
         self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
         self._odometry, self._shift = guarded_zeros(3), guarded_zeros(3)
         self._found, self._quick, self._way = guarded_zeros(3), guarded_zeros(2), guarded_zeros(2)
+        self._felt, self._evaded = guarded_zeros(2), guarded_zeros(1)
         super().__init__(robot, config, **arguments)
 
     def arguments(self) -> dict[str, Any]:
@@ -123,6 +128,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self._known_orders[:], self._mean[:] = 0.0, 0.0
         self._odometry[:], self._shift[:] = 0.0, 0.0
         self._quick[:], self._way[:] = 0.0, 0.0
+        self._felt[:], self._evaded[:] = (AGAIN, 0.0), 0.0
         self._begin_walk(options)
         self._error[:] = -self._known_orders[:3]
 
@@ -137,7 +143,8 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         return self._known_orders[:3]
 
     def _readings(self, kind: type[Block]) -> tuple[Any, ...]:
-        read = self._known_orders, self._error, self._calibrated, self._shift, self._way
+        read = (self._known_orders, self._error, self._calibrated, self._shift, self._way,
+                self._evaded)  # fmt: skip
         return read if kind is CommandView else super()._readings(kind)
 
     def _step_members(self) -> dict[str, Any]:
@@ -168,7 +175,17 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
             part=float(-np.expm1(-period / QUICK_TIME)),
             gain=self.calibration.admittance,
         )
-        own = {"course": course, "correction": correction, "admittance": admittance}
+        evasion = Evasion(
+            state=self.state_source.state_arrays,
+            command=self._known_orders,
+            knots=self._evasion,
+            felt=self._felt,
+            turn=self._evaded,
+            omega=self.scales.omega,
+            period=period,
+        )
+        own = {"course": course, "correction": correction, "admittance": admittance,
+               "evasion": evasion}  # fmt: skip
         return {**super()._step_members(), **own}
 
     def _report(self) -> Program:

@@ -30,6 +30,7 @@ class CommandView(Block):
     calibration: CalibrationArrays
     shift: np.ndarray  # (3,) of a `Correction`
     way: np.ndarray  # (2,) of an `Admittance`
+    evasion: np.ndarray  # (1,) of an `Evasion`
 
 
 @compiled
@@ -53,6 +54,7 @@ def command_velocity(t: CommandView):
 def command_turn(t: CommandView):
     seen = t.seen
     turn = observed_turn(t.calibration, t.command, stands_still(t), t.shift[2])
+    turn += t.evasion[0]
     seen.out[0] = turn / (0.2 * seen.scales.omega)
 
 

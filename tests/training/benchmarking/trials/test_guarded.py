@@ -91,9 +91,9 @@ def test_a_guard_plays_a_suite_the_same_with_any_workers(name: str, tmp_path: Pa
     """It walks, is pushed, and takes over; with motors and sensors of `field`."""
     pytest.importorskip(WHEEL, reason="its model is not installed: pip install 'poise[robots]'")
     network(guard_config(name).walker)
-    suite = write_yaml(tmp_path / "suite.yaml", duration=3.0, walk_push={
-        "command": {"ahead": 0.5}, "directions": 2, "impulses": [1.2, 1.6], "first_trials": 2,
-        "trials": 1, "start": 1.0})  # fmt: skip
+    suite = write_yaml(tmp_path / "suite.yaml", duration=1.6, walk_push={
+        "command": {"ahead": 0.5}, "directions": 1, "impulses": [1.2, 1.6], "first_trials": 2,
+        "trials": 1, "start": 0.6})  # fmt: skip
     for workers in (1, 2):
         evaluate([name], suite, out=tmp_path / str(workers), robot="unitree_g1", seed=3,
                  workers=workers, realism="field")  # fmt: skip
