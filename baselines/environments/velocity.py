@@ -106,12 +106,12 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self.command_sampler = CommandSampler() if command is None else command_sampler(command)
         self.calibration = calibration or Calibration()
         self._calibrated = self.calibration.arrays()
-        self._evasion = np.array(self.calibration.evasion, float).reshape(-1, 2)
+        self._evasion = np.array(self.calibration.evasion, float).reshape(-1, 4)
         self._take_orders(guarded_zeros(COMMAND_ENTRIES), type(self).__name__)
         self._mean, self._error = guarded_zeros(3), guarded_zeros(3)
         self._odometry, self._shift = guarded_zeros(3), guarded_zeros(3)
         self._found, self._quick, self._way = guarded_zeros(3), guarded_zeros(2), guarded_zeros(2)
-        self._felt, self._evaded = guarded_zeros(2), guarded_zeros(1)
+        self._felt, self._evaded = guarded_zeros(4), guarded_zeros(3)
         super().__init__(robot, config, **arguments)
 
     def arguments(self) -> dict[str, Any]:
@@ -128,7 +128,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self._known_orders[:], self._mean[:] = 0.0, 0.0
         self._odometry[:], self._shift[:] = 0.0, 0.0
         self._quick[:], self._way[:] = 0.0, 0.0
-        self._felt[:], self._evaded[:] = (AGAIN, 0.0), 0.0
+        self._felt[:], self._evaded[:] = (0.0, 0.0, 0.0, AGAIN), 0.0
         self._begin_walk(options)
         self._error[:] = -self._known_orders[:3]
 
@@ -180,7 +180,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
             command=self._known_orders,
             knots=self._evasion,
             felt=self._felt,
-            turn=self._evaded,
+            shown=self._evaded,
             omega=self.scales.omega,
             period=period,
         )

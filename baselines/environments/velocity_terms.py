@@ -30,7 +30,7 @@ class CommandView(Block):
     calibration: CalibrationArrays
     shift: np.ndarray  # (3,) of a `Correction`
     way: np.ndarray  # (2,) of an `Admittance`
-    evasion: np.ndarray  # (1,) of an `Evasion`
+    evasion: np.ndarray  # (3,) of an `Evasion`
 
 
 @compiled
@@ -46,15 +46,17 @@ VELOCITY_TERMS = Terms(TERMS, CommandView)  #: by name; those of every environme
 @VELOCITY_TERMS.add(GROUND, "0.2 ω h", "commanded velocity, ahead and to the left", "vector")
 def command_velocity(t: CommandView):
     seen, unit, still = t.seen, t.seen.scales.velocity, stands_still(t)
-    seen.out[0] = observed_ahead(t.calibration, t.command, still, t.shift[0], t.way[0]) / unit
-    seen.out[1] = observed_left(t.calibration, t.command, still, t.shift[1], t.way[1]) / unit
+    ahead = observed_ahead(t.calibration, t.command, still, t.shift[0], t.way[0])
+    left = observed_left(t.calibration, t.command, still, t.shift[1], t.way[1])
+    seen.out[0] = (ahead + t.evasion[0]) / unit
+    seen.out[1] = (left + t.evasion[1]) / unit
 
 
 @VELOCITY_TERMS.add(("z",), "0.2 ω", "commanded turning rate, to the left", "turn")
 def command_turn(t: CommandView):
     seen = t.seen
     turn = observed_turn(t.calibration, t.command, stands_still(t), t.shift[2])
-    turn += t.evasion[0]
+    turn += t.evasion[2]
     seen.out[0] = turn / (0.2 * seen.scales.omega)
 
 

@@ -36,8 +36,8 @@ class Calibration:
         start: s of ahead, left [m/s] and turn [rad/s].
         correction: k [1/s] of the integral of the velocity's error, see `correction.py`; 0: none.
         admittance: how far it gives way to a push, κ of `admittance.py`; 0: not at all.
-        evasion: Knots of the turn [°, rad/s] that is observed after a push from there, T of
-            `evasion.py`, from 0 to 180°.
+        evasion: Knots (θ, A, L, T) [°, m/s, m/s, rad/s] of what is observed after a push, see
+            `evasion.py`; from 0 to 180°.
     """
 
     ahead: Knots = ()
@@ -50,7 +50,9 @@ class Calibration:
     correction: float = field(default=0.0, metadata={"min": 0.0, "max": 5.0})
     admittance: float = field(default=0.0, metadata={"min": 0.0, "max": 5.0, "omit": "default"})
 
-    evasion: Knots = field(default=(), metadata={"omit": "default"})
+    evasion: tuple[tuple[float, float, float, float], ...] = field(
+        default=(), metadata={"omit": "default"}
+    )
 
     def __post_init__(self) -> None:
         for name in AXES:
@@ -66,7 +68,7 @@ class Calibration:
                 raise ValueError(f"{name}: must begin with [0, 0]; both sides are alike")
         if any(len(self._both(name)) > MOST_KNOTS for name in AXES):
             raise ValueError(f"at most {MOST_KNOTS} knots in an axis")
-        angles = [angle for angle, _ in self.evasion]
+        angles = [angle for angle, *_ in self.evasion]
         if angles and (angles != sorted(set(angles)) or angles[0] != 0.0 or angles[-1] != 180.0):
             raise ValueError("evasion: angles must increase from 0 to 180°")
 
