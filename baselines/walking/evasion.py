@@ -23,7 +23,7 @@ from poise.envs.physics.kinematics import StateArrays
 
 ROLL = 2.0  # a push of one size turns the trunk about half as fast to the side as ahead
 FELT = 0.3
-HOLD = 0.6  # [s]
+HOLD = 0.5  # [s]
 AGAIN = 1.5  # [s]
 
 

@@ -24,6 +24,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ import numpy as np
 import torch
 
 from poise.envs.balance.vector.batch import EnvBatch
+from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
 from poise.training.learning import checkpoints, train
 from poise.training.learning.policy import Policy, load_policy, locate_policy
@@ -42,17 +44,16 @@ AFTER, PARTIAL = 2.6, 0.5  # [s] that counts after a push; what a fall at its en
 SIZES = {"f": 0.05, "x": 0.02, "y": 0.02, "z": 0.02, "gx": 0.08, "gy": 0.08}  # of a step of 1
 COLUMNS = {"x": 0, "y": 1, "z": 2, "gx": 3, "gy": 4}
 SIGN = np.array([-1.0, 1.0, -1.0, 1.0, -1.0])  # of the mirror image of z
-LEG, MIDDLE = range(6), (12, 13, 14)  # actions of the left leg; waist yaw, roll, pitch
-#: (action, gain) that is searched
-ROWS = (
-    [(j, gain) for j in LEG for gain in ("f", "gx", "y", "gy", "x")]
-    + [(12, gain) for gain in ("f", "gy", "x", "z")]
-    + [(13, gain) for gain in ("f", "gy", "x")]
-    + [(14, gain) for gain in ("f", "gx", "y")]
-    + [(2, "z")]
-    + [(15, gain) for gain in ("f", "gx", "y")]  # shoulder pitch
-    + [(16, gain) for gain in ("f", "gy", "x")]  # shoulder roll
-)
+LEG = ("f", "gx", "y", "gy", "x")
+AHEAD, ASIDE = ("f", "gx", "y"), ("f", "gy", "x")
+#: joint, without side and `_joint`; the gains that are searched
+SEARCHED: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("hip_pitch", LEG), ("hip_roll", LEG), ("hip_yaw", LEG),
+    ("knee", LEG), ("knee_pitch", LEG), ("ankle_pitch", LEG), ("ankle_roll", LEG),
+    ("waist_yaw", ("f", "gy", "x", "z")), ("waist", ("f", "gy", "x", "z")),
+    ("waist_roll", ASIDE), ("waist_pitch", AHEAD),
+    ("hip_yaw", ("z",)), ("shoulder_pitch", AHEAD), ("shoulder_roll", ASIDE),
+)  # fmt: skip
 #: level, kick [m/s] or push [N·s], least, largest, speed ahead [m/s], how many
 MIXES: dict[str, list[tuple[str, str, float, float, float, int]]] = {
     "even": [
@@ -68,15 +69,31 @@ MIXES: dict[str, list[tuple[str, str, float, float, float, int]]] = {
         ("field", "kick", 2.6, 3.8, 0.5, 6), ("field", "push", 40, 56, 0.5, 4),
         ("late", "kick", 3.3, 4.4, 0.5, 4),
     ],
+    "t1": [
+        ("ideal", "kick", 1.7, 3.2, 0.5, 12), ("ideal", "push", 42, 60, 0.5, 12),
+        ("ideal", "push", 42, 60, 0.0, 4), ("ideal", "kick", 1.7, 3.0, 0.0, 2),
+        ("field", "kick", 1.2, 2.4, 0.5, 6), ("field", "push", 34, 52, 0.5, 6),
+        ("field", "push", 34, 52, 0.0, 2),
+        ("late", "kick", 1.4, 2.6, 0.5, 2), ("late", "push", 38, 54, 0.5, 2),
+    ],
 }  # fmt: skip
 
 
-def law_of(numbers: np.ndarray, policy: Policy) -> tuple[np.ndarray, np.ndarray]:
-    """f (na,) and L (na, 5); what `ROWS` leave out is 1 and 0."""
+def searched(names: Sequence[str]) -> list[tuple[int, str]]:
+    """(action, gain) of each number, for the actions of these `names`; those of the left side."""
+    plain = [name.lower().removesuffix("_joint").removeprefix("left_") for name in names]
+    return [(plain.index(joint), gain) for joint, gains in SEARCHED if joint in plain
+            for gain in gains]  # fmt: skip
+
+
+def law_of(
+    numbers: np.ndarray, rows: list[tuple[int, str]], policy: Policy
+) -> tuple[np.ndarray, np.ndarray]:
+    """f (na,) and L (na, 5); what `rows` leave out is 1 and 0."""
     assert policy.mirrors is not None
     done = policy.mirrors[1]
     f, law = np.ones(len(done.order)), np.zeros((len(done.order), 5))
-    for number, (j, gain) in zip(numbers, ROWS, strict=True):
+    for number, (j, gain) in zip(numbers, rows, strict=True):
         if gain == "f":
             f[j] += SIZES[gain] * number
         else:
@@ -85,8 +102,8 @@ def law_of(numbers: np.ndarray, policy: Policy) -> tuple[np.ndarray, np.ndarray]
     right = done.order < np.arange(len(done.order))
     f[right] = f[done.order][right]
     law[right] = image[right]
-    for j in MIDDLE:
-        law[j] = 0.5 * (law[j] + image[j])
+    middle = done.order == np.arange(len(done.order))
+    law[middle] = 0.5 * (law + image)[middle]
     return f, law
 
 
@@ -106,6 +123,8 @@ class Trials:
         self.rows = [row[:5] for row in MIXES[mix] for _ in range(row[5])]
         self.batch = EnvBatch([self.policy.make_env(duration=9.0, pushes=None, realism=level)
                                for level, *_ in self.rows])  # fmt: skip
+        env = self.batch.envs[0]
+        self.numbers, self.body = searched(env.action_names), push_bodies(env.robot)[0]
         self.period = self.batch.envs[0].config.policy_period
         self.newest = len(self.policy.mean) - sum(t.size for t in self.batch.envs[0]._newest)
 
@@ -119,14 +138,14 @@ class Trials:
             if kind == "kick":
                 push["delta_v"] = size
             else:
-                push |= {"impulse": size, "duration": 0.1, "body": "torso_link"}
+                push |= {"impulse": size, "duration": 0.1, "body": self.body}
             options.append({"command": [{"start": 0.0, "ahead": ahead}], "push": push})
             starts.append(start)
         return options, np.array(starts)
 
     def play(self, numbers: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """What each trial is worth, and who did not fall."""
-        f, law = law_of(numbers, self.policy)
+        f, law = law_of(numbers, self.numbers, self.policy)
         options, starts = self.draw(seed)
         count, batch = len(starts), self.batch
         batch.reset([1000 * seed + i for i in range(count)], options)
@@ -161,7 +180,7 @@ def compare(trials: Trials, numbers: np.ndarray, seed: int, batches: int) -> Non
     levels = np.tile([level for level, *_ in trials.rows], batches)
     without, with_it = (
         np.concatenate([trials.play(each, seed + k)[1] for k in range(batches)])
-        for each in (np.zeros(len(ROWS)), numbers)
+        for each in (np.zeros(len(numbers)), numbers)
     )
     for level in dict.fromkeys(levels):
         a, b = without[levels == level], with_it[levels == level]
@@ -169,9 +188,9 @@ def compare(trials: Trials, numbers: np.ndarray, seed: int, batches: int) -> Non
               f"lost {(a & ~b).sum()}")  # fmt: skip
 
 
-def fold(numbers: np.ndarray, name: str, newest: int, out: Path) -> None:
-    policy, source = load_policy(name), locate_policy(name)
-    f, law = law_of(numbers, policy)
+def fold(numbers: np.ndarray, trials: Trials, name: str, out: Path) -> None:
+    policy, source, newest = load_policy(name), locate_policy(name), trials.newest
+    f, law = law_of(numbers, trials.numbers, policy)
     mean, scale = policy.mean[newest : newest + 5], policy.scale[newest : newest + 5]
     weights = {
         key: value.clone() for key, value in read_parameters(source / POLICY)["policy"].items()
@@ -224,7 +243,7 @@ def main() -> None:
     parser.add_argument("--batches", type=int, default=3)
     args = parser.parse_args()
     trials = Trials(args.what if args.task == "search" else args.mix, args.policy)
-    numbers = np.zeros(len(ROWS))
+    numbers = np.zeros(len(trials.numbers))
     known = args.start if args.task == "search" else Path(args.what)
     if known is not None:
         numbers = np.loadtxt(known)
@@ -233,7 +252,7 @@ def main() -> None:
     elif args.task == "compare":
         compare(trials, numbers, args.seed, args.batches)
     else:
-        fold(numbers, args.policy, trials.newest, args.out)
+        fold(numbers, trials, args.policy, args.out)
 
 
 if __name__ == "__main__":
