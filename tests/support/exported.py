@@ -12,7 +12,7 @@ import pytest
 
 from poise.training.deploy.export.export import export_policy
 from poise.training.learning.policy import Policy, load_policy
-from tests.support.shared import finished_run, policies_here, robot
+from tests.support.shared import finished_run, policies_here, robot, robot_of
 
 pytest.importorskip("safetensors", reason="exports policies: pip install 'poise[export]'")
 pytest.importorskip("onnxruntime", reason="plays ONNX files: pip install 'poise[onnx]'")
@@ -25,7 +25,7 @@ def policy(name: str) -> Policy:
     """A packaged policy, or that of a small training run."""
     if name == "run":
         return load_policy(finished_run(), robot())
-    return load_policy(name, robot("unitree_g1" if "-g1" in name else "humanoid"))
+    return load_policy(name, robot(robot_of(name)))
 
 
 @functools.cache

@@ -25,7 +25,13 @@ def robot(name: str = "humanoid") -> Robot:
 def policies_here() -> list[str]:
     """The packaged policies, but those whose robot's model is not installed."""
     here = importlib.util.find_spec(WHEEL) is not None
-    return [name for name in packaged("policies") if here or "-g1" not in name]
+    return [name for name in packaged("policies") if here or robot_of(name) == "humanoid"]
+
+
+def robot_of(policy: str) -> str:
+    """The robot of a packaged policy, by its name; humanoid for what is none."""
+    public = {"g1": "unitree_g1", "t1": "booster_t1"}
+    return next((public[part] for part in policy.split("-") if part in public), "humanoid")
 
 
 def generic_state(name: str = "humanoid", seed: int = 0) -> Simulation:

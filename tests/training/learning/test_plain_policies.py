@@ -16,7 +16,7 @@ from poise.configs.files import packaged_folder
 from poise.training.learning.policy import load_policy
 from poise.training.learning.policy_files import POLICY, STATISTICS
 from poise.training.learning.train import train
-from tests.support.shared import finished_run, policies_here, robot, tiny_config
+from tests.support.shared import finished_run, policies_here, robot, robot_of, tiny_config
 
 SHIPPED = policies_here()
 
@@ -57,7 +57,7 @@ def test_sb3_loads_the_same_policy(name: str, request: pytest.FixtureRequest) ->
     the mean of what the loaded one says of an observation and of its mirror image. Whatever stands
     in privileged entries, which come last, changes nothing."""
     folder = folder_of(name, request)
-    body = robot("unitree_g1" if "-g1" in name else "humanoid")
+    body = robot(robot_of(name))
     policy, model = load_policy(folder, body), PPO.load(folder / POLICY, device="cpu")
     assert model.learning_rate == policy.config.ppo.learning_rate
     data = np.load(folder / STATISTICS)

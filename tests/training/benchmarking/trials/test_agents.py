@@ -62,7 +62,8 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     with pytest.raises(
         ConfigError,
         match="momentum-qp, .*residual-walk, residual-walk-fast, residual-walk-field, "
-        "residual-whole-g1, residual-whole-g1-field, velocity-g1, guard-falcon-g1, guard-g1, zero",
+        "residual-whole-g1, residual-whole-g1-field, velocity-g1, velocity-t1, guard-falcon-g1, "
+        "guard-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
@@ -103,11 +104,12 @@ def test_a_packaged_policy_is_known_by_its_folder(
     names += ["residual-step", "residual-torque", "residual-torque-field"]
     others = ["residual-walk", "residual-walk-fast", "residual-walk-field"]
     others += [*(f"residual-whole-g1{where}" for where in ("", "-field")), "velocity-g1"]
-    assert packaged("policies") == [*names, *others]
+    of_t1 = ["velocity-t1"]
+    assert packaged("policies") == [*names, *others, *of_t1]
     assert default_controllers()[-8:] == tuple(names)
     assert default_controllers("unitree_g1")[-3:] == tuple(others[3:])
     guards = packaged("guards")
-    with pytest.raises(ConfigError, match=", ".join([*names, *others, *guards, "zero"])):
+    with pytest.raises(ConfigError, match=", ".join([*names, *others, *of_t1, *guards, "zero"])):
         load_agent("residual-abe07", robot)
 
 
@@ -140,12 +142,12 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
         steps = "residual-torque" if found.step_residual.torque > 0.0 else "residual-step"
         others = {"torque": "ppo-torque", "step": steps, "whole": "residual-whole-g1"}
         others |= {"walk": f"residual-{found.controller}", "position": "ppo-position"}
-        others |= {"velocity": "velocity-g1"}
+        others |= {"velocity": f"velocity-{found.robot[-2:]}"}
         level = "" if found.env.realism.ideal else f"-{found.env.realism.name}"
         assert name == f"{others[found.action]}{level}"
     else:
         on_baseline = found.controller in ("momentum-qp", "momentum-qp-compensated")
         assert name == ("residual" if on_baseline else f"residual-{found.controller}")
     files = list((file_names.packaged_folder("policies") / name).iterdir())
-    seen = found.env.observation.history  # of how many steps: the first layer is as wide
-    assert sum(path.stat().st_size for path in files) < 1_300_000 + 200_000 * seen
+    seen = len(load_policy(name).mean)  # the first layer is as wide
+    assert sum(path.stat().st_size for path in files) < 1_200_000 + 3_000 * seen
