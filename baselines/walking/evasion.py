@@ -9,7 +9,8 @@ that the gyro shows a push the policy observes, for `HOLD`, a velocity and a tur
 θ the direction of the push, 0 ahead, 180° back, σ = 1 to the left; of a push in the sagittal plane
 the least sign of ω_x decides. What is chosen is kept: a push is shown by
 √((`ROLL` ω_x)² + ω_y²) > `FELT` √(g/h), where none was within `AGAIN`. A robot that is to walk,
-or was within `AGAIN`, does not evade.
+or was within `AGAIN`, does not evade; nor does one that is pushed off its middle, of which
+|ω_z| > `OFF` times that root tells.
 """
 
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ ROLL = 2.0  # a push of one size turns the trunk about half as fast to the side 
 FELT = 0.3
 HOLD = 0.5  # [s]
 AGAIN = 1.5  # [s]
+OFF = 0.6  # 0.5 at most of pushes at the torso's middle, 0.5 to 3 of those at a shoulder
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +49,14 @@ def evade(e: Evasion):
     e.felt[3] += e.period
     if e.command[0] != 0.0 or e.command[1] != 0.0 or e.command[2] != 0.0:
         e.felt[:] = 0.0
-    if e.knots.shape[0] > 0 and e.felt[3] > AGAIN and np.hypot(roll, pitch) > FELT * e.omega:
+    size = np.hypot(roll, pitch)
+    if e.knots.shape[0] > 0 and e.felt[3] > AGAIN and size > FELT * e.omega:
         angle, side = np.degrees(np.arctan2(abs(roll), pitch)), -1.0 if roll > 0.0 else 1.0
         for a in range(3):
             value = np.interp(angle, e.knots[:, 0], e.knots[:, 1 + a])
             e.felt[a] = value if a == 0 else side * value
+        if abs(e.state.qvel[5]) > OFF * size:
+            e.felt[:] = 0.0
         e.felt[3] = 0.0
     for a in range(3):
         e.shown[a] = e.felt[a] if e.felt[3] < HOLD else 0.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.walking.calibration import Calibration
-from poise.baselines.walking.evasion import AGAIN, FELT, HOLD, ROLL, Evasion, evade
+from poise.baselines.walking.evasion import AGAIN, FELT, HOLD, OFF, ROLL, Evasion, evade
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build
 from tests.support.shared import generic_state
@@ -22,9 +22,9 @@ def law(knots=KNOTS, **command):
                    np.zeros(3), OMEGA, PERIOD)  # fmt: skip
 
 
-def shown(evasion, roll, pitch):
+def shown(evasion, roll, pitch, yaw=0.0):
     """What is observed besides in a policy step with these rates of the root [√(g/h)]."""
-    evasion.state.qvel[3:5] = OMEGA * roll, OMEGA * pitch
+    evasion.state.qvel[3:6] = OMEGA * roll, OMEGA * pitch, OMEGA * yaw
     evade(evasion)
     return evasion.shown.copy()
 
@@ -56,6 +56,14 @@ def test_no_push_no_turn():
     """Of rates below the threshold, and without knots."""
     assert not shown(law(), 0.4 * FELT / ROLL, 0.8 * FELT).any()
     assert not shown(law(knots=()), 1.0, 1.0).any()
+
+
+def test_a_push_off_the_middle_is_left_to_the_policy():
+    """Until the next."""
+    evasion, size = law(), np.hypot(ROLL * 0.3, 0.5)
+    assert not shown(evasion, 0.3, 0.5, -1.1 * OFF * size).any()
+    assert not shown(evasion, 0.3, 0.5).any()
+    assert shown(law(), 0.3, 0.5, 0.9 * OFF * size).any()
 
 
 @pytest.mark.parametrize("command", [{"ahead": 0.5}, {"left": -0.2}, {"turn": 0.3}])
