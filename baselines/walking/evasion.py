@@ -26,7 +26,7 @@ ROLL = 2.0  # a push of one size turns the trunk about half as fast to the side 
 FELT = 0.3
 HOLD = 0.5  # [s]
 AGAIN = 1.5  # [s]
-OFF = 0.6  # 0.5 at most of pushes at the torso's middle, 0.5 to 3 of those at a shoulder
+OFF = 1.0  # 0.9 at most of 93 pushes at the torso's middle; above it 8 of 12 at a shoulder
 
 
 @dataclass(frozen=True, eq=False)
