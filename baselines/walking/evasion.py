@@ -1,16 +1,16 @@
-"""Evasion: a robot that stands is shown a command when it is pushed.
+"""Evasion: a push changes the command that a standing robot observes.
 
 A policy that is the mean of a network and of its mirror image has to choose the foot that steps,
 again in every policy step; a push from straight ahead does not tell it which. So from the moment
-that the gyro shows a push the policy observes, for `HOLD`, a velocity and a turning rate besides,
+that the gyro shows a push the policy observes, for `HOLD`, an added velocity and turning rate,
 
     u = f(c + δ) + y + (A(θ), σ L(θ), σ T(θ)),  θ = atan2(`ROLL` |ω_x|, ω_y),  σ = −sgn(ω_x),
 
 θ the direction of the push, 0 ahead, 180° back, σ = 1 to the left; of a push in the sagittal plane
 the least sign of ω_x decides. What is chosen is kept: a push is shown by
 √((`ROLL` ω_x)² + ω_y²) > `FELT` √(g/h), where none was within `AGAIN`. A robot that is to walk,
-or was within `AGAIN`, does not evade; nor does one that is pushed off its middle, of which
-|ω_z| > `OFF` times that root tells.
+or was within `AGAIN`, does not evade. Nor does one that is pushed off its middle: |ω_z| is then
+above `OFF` times that root.
 """
 
 from dataclasses import dataclass
@@ -37,14 +37,14 @@ class Evasion(Block):
     command: np.ndarray  # (8,) c, see `GaitCommand.array`
     knots: np.ndarray  # (n, 4) θ, A, L, T [°, m/s, m/s, rad/s]
     felt: Annotated[np.ndarray, 4]  # A, σ L, σ T of the last push; the time since then [s]
-    shown: Annotated[np.ndarray, 3]  # what is observed besides [m/s, m/s, rad/s]
+    shown: Annotated[np.ndarray, 3]  # what is added to what is observed [m/s, m/s, rad/s]
     omega: float  # √(g/h) [1/s]
     period: float  # of the policy step [s]
 
 
 @compiled
 def evade(e: Evasion):
-    """Update what is observed besides, by a policy step."""
+    """Update what is added to the observed command, by a policy step."""
     roll, pitch = ROLL * e.state.qvel[3], e.state.qvel[4]
     e.felt[3] += e.period
     if e.command[0] != 0.0 or e.command[1] != 0.0 or e.command[2] != 0.0:
