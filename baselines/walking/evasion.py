@@ -1,7 +1,7 @@
 """Evasion: a push changes the command that a standing robot observes.
 
 A policy that is the mean of a network and of its mirror image has to choose the foot that steps,
-again in every policy step; a push from straight ahead does not tell it which. So from the moment
+again in every policy step; a push straight ahead or back does not tell it which. So from the moment
 that the gyro shows a push the policy observes, for `HOLD`, an added velocity and turning rate,
 
     u = f(c + δ) + y + (A(θ), σ L(θ), σ T(θ)),  θ = atan2(`ROLL` |ω_x|, ω_y),  σ = −sgn(ω_x),
