@@ -45,18 +45,19 @@ class Evasion(Block):
 @compiled
 def evade(e: Evasion):
     """Update what is added to the observed command, by a policy step."""
+    if e.knots.shape[0] == 0:
+        return
     roll, pitch = ROLL * e.state.qvel[3], e.state.qvel[4]
     e.felt[3] += e.period
     if e.command[0] != 0.0 or e.command[1] != 0.0 or e.command[2] != 0.0:
         e.felt[:] = 0.0
     size = np.hypot(roll, pitch)
-    if e.knots.shape[0] > 0 and e.felt[3] > AGAIN and size > FELT * e.omega:
-        angle, side = np.degrees(np.arctan2(abs(roll), pitch)), -1.0 if roll > 0.0 else 1.0
-        for a in range(3):
-            value = np.interp(angle, e.knots[:, 0], e.knots[:, 1 + a])
-            e.felt[a] = value if a == 0 else side * value
-        if abs(e.state.qvel[5]) > OFF * size:
-            e.felt[:] = 0.0
-        e.felt[3] = 0.0
+    if e.felt[3] > AGAIN and size > FELT * e.omega:
+        e.felt[:] = 0.0
+        if abs(e.state.qvel[5]) <= OFF * size:
+            angle, side = np.degrees(np.arctan2(abs(roll), pitch)), -1.0 if roll > 0.0 else 1.0
+            for a in range(3):
+                value = np.interp(angle, e.knots[:, 0], e.knots[:, 1 + a])
+                e.felt[a] = value if a == 0 else side * value
     for a in range(3):
         e.shown[a] = e.felt[a] if e.felt[3] < HOLD else 0.0

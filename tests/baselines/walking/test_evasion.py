@@ -23,7 +23,7 @@ def law(knots=KNOTS, **command):
 
 
 def shown(evasion, roll, pitch, yaw=0.0):
-    """What is observed besides in a policy step with these rates of the root [√(g/h)]."""
+    """What is added to the command in a policy step with these rates of the root [√(g/h)]."""
     evasion.state.qvel[3:6] = OMEGA * roll, OMEGA * pitch, OMEGA * yaw
     evade(evasion)
     return evasion.shown.copy()
