@@ -20,10 +20,11 @@ from poise.baselines.walking.schedule import (
     command_sampler,
     follow_timetable,
 )
+from poise.baselines.walking.smoothing import Smoothing, aim_smoothly
 from poise.envs.balance.config import EnvConfig
 from poise.envs.balance.episode import end_step
 from poise.envs.balance.mdp.observation import View
-from poise.envs.balance.position import PositionBalanceEnv, PositionStep, drive_step
+from poise.envs.balance.position import PositionBalanceEnv, PositionStep, run_servos
 from poise.envs.balance.torque import MotorStep
 from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
@@ -44,12 +45,14 @@ class VelocityStep(PositionStep):
     correction: Correction
     admittance: Admittance
     evasion: Evasion
+    smoothing: Smoothing
 
 
 @compiled
 def velocity_step(step: VelocityStep):
     """The policy step of `position_step`, judged by the command too."""
-    drive_step(step)
+    aim_smoothly(step.smoothing, step.servos, step.episode.action)
+    run_servos(step)
     follow_course(step.course)
     correct_course(step.correction)
     give_way(step.admittance)
@@ -129,6 +132,7 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
         self._odometry[:], self._shift[:] = 0.0, 0.0
         self._quick[:], self._way[:] = 0.0, 0.0
         self._felt[:], self._evaded[:] = (0.0, 0.0, 0.0, AGAIN), 0.0
+        self.servos.target[:] = self.servos.hold
         self._begin_walk(options)
         self._error[:] = -self._known_orders[:3]
 
@@ -184,8 +188,14 @@ class VelocityEnv(FollowingEnv, CommandedEnv, PositionBalanceEnv):
             omega=self.scales.omega,
             period=period,
         )
+        smoothing = Smoothing(
+            state=self.state_source.state_arrays,
+            command=self._known_orders,
+            least=self.calibration.smoothing,
+            omega=self.scales.omega,
+        )
         own = {"course": course, "correction": correction, "admittance": admittance,
-               "evasion": evasion}  # fmt: skip
+               "evasion": evasion, "smoothing": smoothing}  # fmt: skip
         return {**super()._step_members(), **own}
 
     def _report(self) -> Program:

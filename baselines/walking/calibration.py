@@ -38,6 +38,8 @@ class Calibration:
         admittance: how far it gives way to a push, κ of `admittance.py`; 0: not at all.
         evasion: Knots (θ, A, L, T) [°, m/s, m/s, rad/s] of what is observed after a push, see
             `evasion.py`; from 0 to 180°.
+        smoothing: the share of a new target that the servos of a robot are given that stands
+            calmly, α₀ of `smoothing.py`; 1: all of it.
     """
 
     ahead: Knots = ()
@@ -53,6 +55,7 @@ class Calibration:
     evasion: tuple[tuple[float, float, float, float], ...] = field(
         default=(), metadata={"omit": "default"}
     )
+    smoothing: float = field(default=1.0, metadata={"min": 0.05, "max": 1.0, "omit": "default"})
 
     def __post_init__(self) -> None:
         for name in AXES:

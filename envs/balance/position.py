@@ -29,8 +29,14 @@ class PositionStep(MotorStep):
 @compiled
 def drive_step(step: PositionStep):
     """New targets, then `substeps` physics steps with torques of their own."""
+    aim(step.servos, step.episode.action)
+    run_servos(step)
+
+
+@compiled
+def run_servos(step: PositionStep):
+    """`substeps` physics steps with torques of their own, by the targets that there are."""
     world, e, views = step.world, step.episode, step.world.views
-    aim(step.servos, e.action)
     for _ in range(step.substeps):
         drive(step.servos, world)
         record_tick(world.robot, views.qvel, views.ctrl, world.robot.timestep, e)

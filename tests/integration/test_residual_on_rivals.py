@@ -19,9 +19,10 @@ from poise.training.learning.train import train
 from tests.support.benchmarks_small import InProcessExecutor, write_small
 from tests.support.evaluations import InProcess, random_suite, write_suite
 from tests.support.shared import tiny_config
+from tests.support.weekly import daily
 
 
-@pytest.mark.parametrize("controller", ["capture-point", "lip-mpc"])
+@pytest.mark.parametrize("controller", daily(["capture-point", "lip-mpc"]))
 def test_a_residual_on_a_rival_end_to_end(
     controller: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

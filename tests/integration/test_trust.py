@@ -57,6 +57,7 @@ from poise.training.running.executor import Executor
 from tests.support.report_folders import copied
 from tests.support.shared import robot, tiny_config
 from tests.support.trap import NAMES, Ground, allowed_there, loaded_there
+from tests.support.weekly import daily
 
 ROOT = Path(__file__).parents[2]
 REFUSED = "runs external code"
@@ -230,7 +231,7 @@ def test_a_name_for_allow_has_a_form(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert "allow" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("kind", ["random", "benchmark"])
+@pytest.mark.parametrize("kind", daily(["benchmark", "random"]))
 def test_a_report_runs_no_controller_of_its_folder(
     ground: Ground,
     kind: str,
@@ -473,7 +474,7 @@ def test_modules_of_the_current_folder_replace_no_library(
     assert sys.path[-1] == str(ground.here) and sys.path.count(str(ground.here)) == 1
 
 
-@pytest.mark.parametrize("backend", ["local", "joblib"])
+@pytest.mark.parametrize("backend", daily(["local", "joblib"]))
 def test_processes_are_told_what_is_allowed(ground: Ground, backend: str) -> None:
     """That, and no more; and they import nothing from the current folder."""
     for module in ("multiprocessing", "joblib", "signal", "numpy", "poise", "contextlib", "yaml"):

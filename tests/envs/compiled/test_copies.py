@@ -29,8 +29,11 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.physics.simulation import Simulation
 from tests.support.copied import BEFORE, KEEPS_TO_ITSELF, KINDS, digest, env_of, outcome, play_env
 from tests.support.shared import robot
+from tests.support.weekly import daily
 
 PATIENCE = 120.0  # [s] until a process counts as hung
+OF_CONTROLLERS = [name for name in KINDS if name.startswith("env of ")]  # alike but for these
+PLAYED = [*(name for name in KINDS if name not in OF_CONTROLLERS), *daily(OF_CONTROLLERS, 3)]
 
 
 def pickled(it: Any) -> Any:
@@ -98,7 +101,7 @@ def played(name: str) -> Played:
     return Played(data, expected, seen, apart)
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", PLAYED)
 def test_a_copy_goes_on_like_the_original(name):
     """To the last bit, when the original has gone on or is gone; and it does not move it."""
     _, expected, seen, _ = played(name)
@@ -106,7 +109,7 @@ def test_a_copy_goes_on_like_the_original(name):
     assert seen == dict.fromkeys(ways(name), expected)
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", PLAYED)
 def test_what_shares_memory_shares_it_in_the_copy(name):
     """The same arrays overlap in the same way, and none overlaps one of the original."""
     apart = played(name).apart
@@ -178,6 +181,7 @@ def play_all(data: dict[str, bytes], connection: Any) -> None:
     connection.send({name: outcome(name, pickle.loads(each)) for name, each in data.items()})
 
 
+@pytest.mark.weekly
 def test_pickles_go_on_alike_in_a_spawned_process():
     """Where all addresses are others."""
     context = multiprocessing.get_context("spawn")

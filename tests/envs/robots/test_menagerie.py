@@ -18,6 +18,7 @@ from poise.envs.robots.menagerie import VARIABLES, WHEEL, find_model
 from poise.envs.robots.robot import load_robot
 from tests.support.refused import invalid
 from tests.support.small_biped import write_biped
+from tests.support.weekly import daily
 
 #: name → mass [kg] and number of joints, by the makers' model
 ROBOTS = {
@@ -142,7 +143,7 @@ def test_packaged() -> None:
         assert (source.menagerie or "").startswith(f"{name}/")
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", daily(ROBOTS, 3))
 def test_it_is_as_its_maker_says_and_stands(name: str) -> None:
     """Mass, joints, motors; bodies to push and roles that exist; a second from a shaky start."""
     pytest.importorskip(WHEEL, reason="its model is not installed: pip install 'poise[robots]'")

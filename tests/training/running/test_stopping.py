@@ -16,6 +16,7 @@ from poise.training.cli.entry import main
 from poise.training.running.stopping import Stopped, stop_code, stoppable, uninterrupted
 from tests.endurance.processes import Running, heed_interrupts, kill
 from tests.support.evaluations import random_suite, write_suite
+from tests.support.weekly import daily
 
 # A native call of minutes that no signal interrupts, as a compilation is. It speaks from within the
 # call: a signal before it would be heard.
@@ -164,7 +165,7 @@ with stoppable(), uninterrupted():
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", daily([signal.SIGINT, signal.SIGTERM]))
 @pytest.mark.parametrize(
     ("code", "exit_code", "out", "told"),
     [

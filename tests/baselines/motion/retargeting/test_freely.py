@@ -28,6 +28,7 @@ from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.configs.errors import ConfigError
 from tests.support.captures import CAPTURES, make
 from tests.support.physics import robot_named
+from tests.support.weekly import daily
 
 EXTRA = Path(__file__).parents[5] / "shared" / "motions" / "extra"
 UNITS = (1.0, 0.01, 0.0254)
@@ -71,7 +72,7 @@ def check_soles(name: str, made: RobotClip) -> None:
     assert np.all(made.qpos[:, 7:] > low - 1e-9) and np.all(made.qpos[:, 7:] < high + 1e-9)
 
 
-@pytest.mark.parametrize("name", CAPTURES)
+@pytest.mark.parametrize("name", daily(CAPTURES, 5))
 def test_made_captures(name: str) -> None:
     """Contacts agree in 95 % of the frames, and soles rest where they are planted."""
     clip, truth = written(name)

@@ -242,6 +242,9 @@ def test_a_pointer_of_git_lfs_is_named(tmp_path: Path) -> None:
     assert "hull.stl is the pointer that Git LFS leaves" in refusal(path)
 
 
+AGAIN = ("scene", "_mjx", "apollo", "op3", "hands", "berkeley")  # large, or like another
+
+
 def public_models() -> Iterator[Any]:
     """MJCF files of robots that installed packages have; a scene is a robot once more, and the
     meshes of Apollo take as long as those of all others.
@@ -255,7 +258,7 @@ def public_models() -> Iterator[Any]:
         spec = find_spec(package)
         for place in (spec.submodule_search_locations or ()) if spec else ():
             for path in sorted((Path(place) / inside).rglob("*.xml")):
-                again = any(part in path.name for part in ("scene", "_mjx", "apollo"))
+                again = any(part in path.name for part in AGAIN)
                 yield pytest.param(path, id=path.name, marks=[pytest.mark.weekly] * again)
 
 

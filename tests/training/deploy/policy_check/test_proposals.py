@@ -14,6 +14,7 @@ from poise.training.cli.entry import main
 from poise.training.deploy.policy_check.check import PolicyCheck, check_policy
 from tests.support.policies import write_onnx, write_yaml
 from tests.support.shared import robot
+from tests.support.weekly import daily
 
 N, FRAME = 25, 84  # joints of `compact`; numbers of a step of the terms below
 TERMS = ["base_ang_vel", "projected_gravity", "velocity_commands", "joint_pos_rel", "joint_vel",
@@ -88,7 +89,7 @@ def test_no_order_stands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert text.count("fell after") == 5 and "it does not stand" in text
 
 
-@pytest.mark.parametrize("term", ["phase", "phase_sin"])
+@pytest.mark.parametrize("term", daily(["phase", "phase_sin"]))
 def test_a_clock_that_is_never_at_rest(
     tmp_path: Path, term: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

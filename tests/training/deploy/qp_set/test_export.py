@@ -14,6 +14,7 @@ from poise.baselines.solvers import QP, make_solver
 from poise.configs.errors import ConfigError, PoiseError
 from poise.training.cli.entry import main
 from poise.training.deploy.qp_set.export import problem_arrays, write_qp_set
+from tests.support.weekly import daily
 
 COUNT = 60  # three trials: the first recovers, the second falls
 FORMS = ("reduced", "full")
@@ -36,7 +37,7 @@ def files(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.npz"))
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", daily(FORMS))
 def test_qpsolvers_loads_and_saves_them(form: str, folder, tmp_path: Path) -> None:
     """A problem comes back from qpsolvers' own save as it was loaded."""
     for path in files(folder(form))[::10]:

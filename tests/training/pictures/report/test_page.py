@@ -22,6 +22,7 @@ from poise.training.pictures.report import page as html_report
 from poise.training.pictures.report.page import write_report
 from tests.support.browser import CHROMIUM, Browser
 from tests.support.report_folders import SOFT, copied, finished
+from tests.support.weekly import daily
 
 
 class Page(HTMLParser):
@@ -58,7 +59,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return functools.cache(lambda name: write_report(finished(name), folder / f"{name}.html"))
 
 
-@pytest.fixture(params=["random", "envelope", "benchmark"])
+@pytest.fixture(params=daily(["benchmark", "random", "envelope"]))
 def report(request: pytest.FixtureRequest, written: Callable[[str], Path]) -> Path:
     """Each of three."""
     return written(request.param)

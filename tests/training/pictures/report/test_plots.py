@@ -12,12 +12,13 @@ import pytest
 from poise.configs.errors import ConfigError
 from poise.training.pictures.report.page import write_report
 from tests.support.report_folders import copied
+from tests.support.weekly import daily
 from tests.training.pictures.report.test_page import Page
 
 DOTS = {1: "1.3 2", 2: "1.3 3.9"}  # the dashes of the limits of one and of two steps
 
 
-@pytest.mark.parametrize("kind", ["envelope-steps", "benchmark-steps"])
+@pytest.mark.parametrize("kind", daily(["benchmark-steps", "envelope-steps"]))
 def test_limits_of_steps_are_shown_where_somebody_steps(kind: str, tmp_path: Path) -> None:
     """Lines with their names, shares in the table; an old folder, without them, has neither."""
     folder = copied(kind, tmp_path)
