@@ -20,6 +20,7 @@ from poise.baselines.registry import (
     performing_controllers,
     where_uncertain,
 )
+from poise.baselines.walking.controller import ClipWalker
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
@@ -100,6 +101,7 @@ class ResidualBalanceEnv(ControlledEnv):
     """
 
     scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
+    _keeps_arms = True  # of a clip that is walked
     only_targets = True  #: the action moves targets and nothing else
     known_terms = FORCE_TERMS
 
@@ -160,6 +162,8 @@ class ResidualBalanceEnv(ControlledEnv):
         """Tell a controller that performs motions with steps which one it is to be."""
         decides = self._base.unwrapped
         self._handed = decides, self._motion
+        if isinstance(decides, ClipWalker):
+            decides.take_clip(self._keeps_arms and self._reference.commands is not None)
         if isinstance(decides, Performer):
             decides.perform(self._reference, self._motion.pace)
         elif self._reference.footing is not None:

@@ -61,6 +61,7 @@ class ResidualWalkEnv(FollowingEnv, ResidualStepEnv):
     """
 
     known_terms = WALK_TERMS
+    _keeps_arms = False  # policies have learned with arms that balance
 
     def __init__(
         self,

@@ -68,6 +68,8 @@ class GaitConfig:
     speed_margin: float = number(0.01, "h ω", min=0.0)  # slower is standing
     # of the joints of arms that swing as commanded, in the posture of the QP
     arm_weight: float = number(30.0, above=0.0, omit="default")
+    # of the joints of trunk and arms, at least, while a clip is walked
+    clip_weight: float = number(3.0, above=0.0, omit="default")
     # until this fraction of the swing the foot stays as high as it is at `swing.lift`, over its own
     # ground and the stance sole's; 0: it comes down once it is up, and only the latter counts
     lower: float = number(0.0, min=0.0, max=0.95, omit="default")

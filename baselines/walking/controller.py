@@ -60,6 +60,14 @@ class ReachingWalker(Protocol):
 
 
 @runtime_checkable
+class ClipWalker(Protocol):
+    """What a controller that walks clips has: environments call it with their motion."""
+
+    def take_clip(self, walked: bool) -> None:
+        """Take that a clip is walked, whose trunk and arms are to be kept, or none."""
+
+
+@runtime_checkable
 class TerrainWalker(Protocol):
     """What a controller that plans its steps on a terrain has: environments set it at the reset."""
 

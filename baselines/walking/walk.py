@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.balance.references.legs import PlantedLegs
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
 from poise.baselines.balance.stepping.planning.blocks import LEG_NUMBERS, SEARCHED, CaptureTick
 from poise.baselines.balance.stepping.planning.config import StepLimits
@@ -108,6 +109,7 @@ class Walk(Commanded, CaptureStep):
         legs = no_legs() if gait.model.keeps_height else leg_arrays(robot)
         self.reference = allocate_reference(robot, gait.qp.period, legs)
         self.arms = swinging_arms(robot, self.gait_sets.posture.weight, gait.arm_weight)
+        self._posture_weight = self.gait_sets.posture.weight.copy()
         super().__init__(robot, config)
 
     @property
@@ -143,6 +145,17 @@ class Walk(Commanded, CaptureStep):
         members = self.gait.named().items()
         kept = {name: each for name, each in members if isinstance(each, np.ndarray)}
         self.gait, self._terrain, self._walk_tick = gait.replace(**kept), terrain, None
+
+    def take_clip(self, walked: bool) -> None:
+        """Hold trunk and arms to the targets' by the gait's `clip_weight` where a clip is walked;
+        else arms are free to balance the robot."""
+        weight, least = self._posture_weight.copy(), 0.0
+        if walked:
+            least = self._level_gait.clip_weight / self.robot.units.omega**4
+        others = PlantedLegs(self.robot).others
+        weight[6:][others] = np.maximum(weight[6:][others], least)
+        self.arms = swinging_arms(self.robot, weight, self._level_gait.arm_weight)
+        self.gait_sets.posture.weight[:], self._walk_tick = weight, None
 
     @property
     def failures(self) -> int:

@@ -31,6 +31,7 @@ from poise.baselines.motion.clips.library import captured_clips
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, retarget_clip
 from poise.envs.robots.robot import load_robot
 from poise.training.motion.following.follow import follow
+from poise.training.motion.following.rehearsal import rehearsal
 from tests.support.captures import CAPTURES, make
 
 OTHERS = ("cmu02_jump", "cmu_12_01_walk", "cmu_jumping_jacks", "fair1_jumping", "makehuman_walk1")
@@ -88,7 +89,8 @@ def kind_of(clip: RobotClip) -> str:
 
 def judge(path: Path, starts: int, seed: int, folder: Path, robot: str) -> Row:
     """Import a capture, and perform it from disturbed starts."""
-    made: RetargetedClip = retarget_clip(read_bvh(path).clip, load_robot(robot))
+    body = load_robot(robot)
+    made: RetargetedClip = retarget_clip(read_bvh(path).clip, body, holds=rehearsal(body))
     how, reason = kind_of(made.clip), made.clip.about.unperformed
     row = Row(path.stem, how, made.stride, made.tempo, made.flight, 1.0, 0, 0.0, reason)
     if reason:

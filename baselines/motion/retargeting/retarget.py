@@ -1,6 +1,6 @@
 """A clip of any skeleton as a motion of a robot: its soles stay planted, or step as the clip's."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -27,6 +27,8 @@ LEAD = 1.0  # [s] from standing into the clip, and back
 SHORTER, SHORTEST = 0.94, 0.3  # by which ways are shortened until legs reach, and the end of that
 #: the robot's limbs, what they are to do from standing to standing, and whether the feet step
 AskedOf = tuple[Limbs, BodyTargets, bool]
+#: whether a motion with steps is performed without a fall and without other steps
+Holds = Callable[[RobotClip], bool]
 #: shares of the clip's lengths of steps and of its tempo, the fastest first
 TRIED = sorted(
     [(stride, 1.0) for stride in (1.0, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5, 0.4)]
@@ -58,6 +60,7 @@ class Retargeted(NamedTuple):
         bound: what keeps it from 0.7 of the clip's speed; empty where nothing does.
         sunk: by how much the CoM is lower than planned where legs would not reach [m].
         spread: share of the clip's width of steps that is kept.
+        held: False where `holds` said no of every motion that it was asked of.
     """
 
     clip: RobotClip
@@ -74,6 +77,7 @@ class Retargeted(NamedTuple):
     bound: str = ""
     sunk: float = 0.0
     spread: float = 1.0
+    held: bool = True
 
 
 def retarget(
@@ -104,14 +108,18 @@ def retarget(
 
 
 def retarget_to(
-    asked: AskedOf, clip: Clip, robot: Robot, *, smooth: float, lead: float
-) -> Retargeted:
-    """`retarget` for what `targets_on` has found with the same arguments; raises what it does."""
+    asked: AskedOf, clip: Clip, robot: Robot, *, smooth: float, lead: float,
+    holds: Holds | None = None,
+) -> Retargeted:  # fmt: skip
+    """`retarget` for what `targets_on` has found with the same arguments; raises what it does.
+
+    Steps are slower where `holds` says no of them; where it never says yes, they are the fastest.
+    """
     limbs, whole, steps = asked
     if steps and (leaps := find_leaps(clip)):
         return _leaping(leaps, clip, robot, limbs, smooth, lead)
     if steps:
-        return _stepped(clip, robot, limbs, smooth, lead)
+        return _stepped(clip, robot, limbs, smooth, lead, holds)
     with needing("motion", "motion"):
         from .solve import solve_frames
     solved = solve_frames(robot, limbs, whole, smooth)
@@ -149,9 +157,11 @@ def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted:
     return limbs, whole, steps
 
 
-def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float) -> Retargeted:
-    """The fastest motion up to the clip's that the robot can do: steps and tempo as of `TRIED`, the
-    CoM as high as legs reach then."""
+def _stepped(
+    clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float, holds: Holds | None
+) -> Retargeted:
+    """The fastest motion up to the clip's that the robot can do, and that holds: steps and tempo as
+    of `TRIED`, the CoM as high as legs reach then."""
     paces, scale = find_paces(clip), limbs.leg_length / clip.skeleton.leg_length
     with needing("motion", "motion"):
         from .solve_tracks import solve_tracks
@@ -177,11 +187,12 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
         return made._replace(tempo=tempo, sunk=sunk, spread=trial.spread)
 
     slow: Retargeted | None = None
+    first: Retargeted | None = None  # the fastest of those that do not hold
     lacks: dict[tuple[float, float], float] = {}  # by way: what is lacking, at the lowest CoM
     for trial in _trials():
-        if trial.sink and lacks.get(trial.way, np.inf) > NEARLY:
+        if trial.sink and (first is not None or lacks.get(trial.way, np.inf) > NEARLY):
             continue
-        if slow is not None and trial.stride * trial.tempo < ENOUGH:
+        if (slow or first) is not None and trial.stride * trial.tempo < ENOUGH:
             continue  # the fastest of these was found before
         try:
             made = made_of(trial)
@@ -192,10 +203,14 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
                 lacks[trial.way] = error.by if isinstance(error, NotReached) else np.inf
             continue
         if made.stride * made.tempo >= ENOUGH:
-            return made
+            if holds is None or holds(made.clip):
+                return made
+            first = first or made._replace(held=False)
+            continue
         slow = slow or made._replace(bound=bound)
-    if slow is not None:
-        return slow
+    found = first or slow
+    if found is not None:
+        return found
     assert reason is not None
     raise reason
 

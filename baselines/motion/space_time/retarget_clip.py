@@ -20,6 +20,7 @@ from poise.baselines.motion.retargeting.retarget import (
     ENOUGH,
     LEAD,
     SMOOTH,
+    Holds,
     Retargeted,
     retarget_freely,
     retarget_to,
@@ -61,7 +62,7 @@ class RetargetedClip(NamedTuple):
         asked: commanded speed over the clip's at that tempo, since the walker is slower.
         flight: share of the time that the clip is in flight.
         bound: why it is slower, as of `Retargeted`; of what walks why it takes other steps.
-        sunk, spread: as of `Retargeted`.
+        sunk, spread, held: as of `Retargeted`.
     """
 
     clip: RobotClip
@@ -78,6 +79,7 @@ class RetargetedClip(NamedTuple):
     asked: float = 1.0
     sunk: float = 0.0
     spread: float = 1.0
+    held: bool = True
 
 
 def retarget_clip(
@@ -90,6 +92,7 @@ def retarget_clip(
     lead: float = LEAD,
     planted: bool = False,
     kinematic: bool | None = None,
+    holds: Holds | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> RetargetedClip:
     """A robot's motion of a clip: one that can be performed, else one that can be seen.
@@ -98,21 +101,24 @@ def retarget_clip(
     None the latter. Where no controller could perform that, or its way or tempo are less than 0.7
     of the clip's, and nothing was asked with `solver`, `constraints` or `planted`, it is the
     former, with what `find_commands` has for a planner that walks. Of what is no faster so either,
-    `about.unperformed` says why. A clip may be the name of a packaged one, or a path. All else, and
-    what is raised, is as of these two.
+    `about.unperformed` says why. `holds` is asked of motions with steps, as a trial of the
+    controller that performs them: where it says no, steps are slower, down to 0.7 of the clip's,
+    and then walked if a planner takes the clip's own. A clip may be the name of a packaged one, or
+    a path. All else, and what is raised, is as of these two.
     """
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
-    reason = "it was retargeted by kinematics alone (--kinematic)"
+    reason, stepped = "it was retargeted by kinematics alone (--kinematic)", None
     if not kinematic:
         asked = kinematic is not None or solver is not None or constraints or planted
         try:
             made = performable(
                 clip, robot, solver=solver, constraints=constraints, smooth=smooth, lead=lead,
-                planted=planted, progress=progress,
+                planted=planted, holds=holds, progress=progress,
             )  # fmt: skip
             reference_from(made.clip, robot, clip.name)
-            if asked or made.stride * made.tempo >= ENOUGH:
+            if asked or (made.held and made.stride * made.tempo >= ENOUGH):
                 return made
+            stepped = None if made.held else made
             reason = (f"{made.bound}; with {made.stride:.2f} of its way at {made.tempo:.2f} of its "
                       "tempo it can be done (--steps)")  # fmt: skip
         except ConfigError as error:
@@ -127,10 +133,13 @@ def retarget_clip(
             found = find_commands(clip, robot, free.scale, ENOUGH)
             walks = walked_clip(free.clip, found, robot)
             reference_from(walks, robot, clip.name)
-            seen, walked = walks, found
+            if stepped is None or not found.bound:
+                seen, walked = walks, found
         except ConfigError as error:
             if error.field == "speed" and not _kneels(clip):
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
+    if stepped is not None and walked is None:
+        return stepped
     scene = _scene(robot, find_limbs(robot), free.clip.qpos, 0.0, free.clip.planted)
     made = _stepped(free, scene)._replace(clip=seen)
     if walked is None:
@@ -171,6 +180,7 @@ def performable(
     smooth: float = SMOOTH,
     lead: float = LEAD,
     planted: bool = False,
+    holds: Holds | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> RetargetedClip:
     """The postures in which a robot does what a clip shows, as `retarget` says, by a solver:
@@ -192,6 +202,7 @@ def performable(
         smooth: low-pass on what the clip asks for [Hz].
         lead: time from standing into the clip, and back [s].
         planted: take the feet as planted though they move in the clip.
+        holds: what is asked of a motion with steps, see `retarget_clip`.
         progress: called with a line after every quadratic program.
 
     Raises:
@@ -215,7 +226,7 @@ def performable(
                           field="solver" if chosen != "frame" else "constraints")  # fmt: skip
     shape = np.tile(robot.standing_qpos, (len(targets), 1))
     check_constraints(wanted, _scene(robot, limbs, shape, lead), source)
-    made = retarget_to(given, clip, robot, smooth=smooth, lead=lead)
+    made = retarget_to(given, clip, robot, smooth=smooth, lead=lead, holds=holds)
     from .asked import Asked  # mink is there: `retarget_to` has used it
     from .grid import by_trial
     from .problem import Problem, optimise
@@ -247,7 +258,7 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
     quality = measure_soles(scene, made.penetration, made.limit_excess, made.direction_error)
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
                           made.begins, made.tempo, made.flight, made.bound, sunk=made.sunk,
-                          spread=made.spread)  # fmt: skip
+                          spread=made.spread, held=made.held)  # fmt: skip
 
 
 def _scene(

@@ -175,6 +175,7 @@ def bring(
     """
     from poise.baselines.balance.references.robot_clip import write_robot_clip
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+    from poise.training.motion.following.rehearsal import rehearsal
     from poise.training.motion.following.tables import print_retargeted
     from poise.training.pictures.figures.encoder import check_video
 
@@ -196,6 +197,7 @@ def bring(
         lead=lead,
         planted=planted,
         kinematic=True if kinematic else False if steps else None,
+        holds=rehearsal(body, said=partial(print, flush=True)),
         progress=partial(print, flush=True),
     )
     write_robot_clip(made.clip, out)

@@ -6,10 +6,12 @@ import functools
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
+from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import command_options
 from poise.baselines.balance.references.robot_clip import (
     RobotClip,
@@ -17,6 +19,8 @@ from poise.baselines.balance.references.robot_clip import (
     reference_from,
     write_robot_clip,
 )
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.motion.clips.contacts import measure_contacts
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.baselines.motion.retargeting.retarget import retarget_freely
@@ -25,6 +29,7 @@ from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.baselines.motion.space_time.walked import find_commands, walked_clip
 from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.command import GaitCommand
+from poise.baselines.walking.walk import Walk
 from poise.configs.errors import ConfigError
 from poise.training.cli.entry import main
 from poise.training.motion.following.follow import follow
@@ -261,6 +266,29 @@ def test_walks_and_turns_are_performed(name: str, starts: int, tmp_path: Path) -
     ahead, _, turn = SPEEDS[name]
     assert np.isfinite(shares[0]).tolist() == [ahead != 0, turn != 0]
     assert shares[np.isfinite(shares)] == pytest.approx(1.0, abs=0.2)
+
+
+def test_trunk_and_arms_of_a_walk_are_the_clip_s(tmp_path: Path) -> None:
+    """Where they are free to balance the robot they are 16° off; a policy has learned with that."""
+    robot, errors = robot_named(HUMANOID), []
+    reference = reference_from(walking("circle"), robot, "circle")
+    for weight in (3.0, 0.001):
+        config = tmp_path / f"{weight}.yaml"
+        config.write_text(f"base: walk\ngait:\n  clip_weight: {weight}\n")
+        (trial,) = follow(reference, str(config), starts=1)
+        assert not trial.fallen
+        errors.append(np.degrees(trial.joint_rms))
+    assert errors[0] < 8.0 and errors[1] > 1.5 * errors[0]
+    walker = cast(Walk, load_controller("walk", robot))
+    free = walker.gait_sets.posture.weight.copy()
+    ResidualWalkEnv(robot, controller=walker, motion=reference)
+    np.testing.assert_array_equal(walker.gait_sets.posture.weight, free)
+    env = ResidualBalanceEnv(robot, controller=walker, motion=reference)
+    assert (walker.gait_sets.posture.weight > free).sum() == len(
+        walker.gait_sets.posture.weight
+    ) - 6 - 12 - 3
+    env.motion = load_motion("standing", robot)
+    np.testing.assert_array_equal(walker.gait_sets.posture.weight, free)
 
 
 def test_a_clip_that_turns_too_far_for_its_own_steps_is_walked() -> None:

@@ -1,0 +1,49 @@
+"""training/motion/following/rehearsal.py: steps that fail are slower, or walked."""
+
+from pathlib import Path
+
+from poise.baselines.balance.references.robot_clip import RobotClip
+from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+from poise.training.motion.following.rehearsal import STARTS, rehearsal
+from tests.support.captures import make
+from tests.support.physics import robot_named
+
+ROBOT = robot_named("humanoid")
+
+
+def test_a_motion_that_is_kept_holds() -> None:
+    said: list[str] = []
+    made = retarget_clip(make("walk")[0], ROBOT, holds=rehearsal(ROBOT, said=said.append))
+    assert made.held and not made.walker and made.clip.planted is not None
+    assert said == [f"trying it: motion-step, {STARTS} starts"]
+
+
+def test_a_controller_that_steps_on_its_own_does_not_hold(tmp_path: Path) -> None:
+    """Nor does one that falls."""
+    clip = retarget_clip(make("walk")[0], ROBOT).clip
+    timid = tmp_path / "timid.yaml"
+    timid.write_text("base: motion-step\nperform:\n  margin: 0.0\n  margin_both: 0.0\n")
+    assert not rehearsal(ROBOT, str(timid))(clip)
+    weak = tmp_path / "weak.yaml"
+    weak.write_text("base: motion-step\nperform:\n  gain: 0.0\n  margin: 9.0\n  margin_both: 9.0\n")
+    assert not rehearsal(ROBOT, str(weak))(clip)
+
+
+def test_what_does_not_hold_is_slower_and_in_the_end_walked() -> None:
+    """By a planner that takes the clip's own steps; else the fastest is left."""
+    clip = make("walk")[0].at_speed(0.9)
+    asked: list[RobotClip] = []
+
+    def second(made: RobotClip) -> bool:
+        asked.append(made)
+        return len(asked) > 1
+
+    fastest = retarget_clip(clip, ROBOT)
+    slower = retarget_clip(clip, ROBOT, holds=second)
+    assert len(asked) == 2 and slower.held
+    assert 0.7 <= slower.stride * slower.tempo <= fastest.stride * fastest.tempo
+    walked = retarget_clip(clip, ROBOT, holds=lambda made: False)
+    assert walked.walker == "walk" and not walked.bound
+    kept = retarget_clip(clip, ROBOT, kinematic=False, holds=lambda made: False)
+    assert not kept.held and not kept.walker
+    assert kept.stride * kept.tempo == fastest.stride * fastest.tempo
