@@ -37,6 +37,8 @@ class ObservationTerm:
         scale: factor, or one for each number of the term, or by the names of its joints; after
             `clip`.
         clip: least and largest value.
+        offset: what is added to its numbers before `clip`, one number or one for each: of
+            ``projected_gravity`` it is a lean that the policy is shown and corrects.
         history: how many policy steps it shows, the last `lag` ones left out.
         frame: in the place of `term`: parts that lie side by side in each of these steps.
         values: the numbers of the term ``constant``.
@@ -63,6 +65,7 @@ class ObservationTerm:
     lag: int = _new(0, min=0, max=1000)
     ahead: tuple[int, ...] = _new((), min=-1000, max=1000)
     fill: Literal["first", "zeros"] = _new("first")
+    offset: float | tuple[float, ...] = _new(0.0)
 
     def __post_init__(self) -> None:
         if self.clip is not None:

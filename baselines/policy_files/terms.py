@@ -150,6 +150,10 @@ class PolicyTerm:
         self._ahead = frames_ahead(described.ahead)
         self.size = len(self.picked) * len(self._ahead)
         self.scale = self._scale([names[i] for i in self.picked] if names else [])
+        self.offset = np.asarray(described.offset, dtype=float)
+        if self.offset.size not in (1, self.size):
+            raise self._wrong("offset", f"has {self.offset.size} numbers, {described.term} has "
+                              f"{self.size}")  # fmt: skip
         self.at_rest = self._at_rest()
 
     def __str__(self) -> str:
@@ -227,6 +231,7 @@ class PolicyTerm:
                                     for ahead in self._ahead])  # fmt: skip
         else:
             value = np.asarray(TERMS[self.name](seen), dtype=float)[self.picked]
+        value = value + self.offset
         if self.described.clip is not None:
             value = np.clip(value, *self.described.clip)
         return value * self.scale

@@ -27,8 +27,9 @@ LEAD = 1.0  # [s] from standing into the clip, and back
 SHORTER, SHORTEST = 0.94, 0.3  # by which ways are shortened until legs reach, and the end of that
 #: the robot's limbs, what they are to do from standing to standing, and whether the feet step
 AskedOf = tuple[Limbs, BodyTargets, bool]
-#: whether a motion with steps is performed without a fall and without other steps
-Holds = Callable[[RobotClip], bool]
+STEPPER = "motion-step"  # the controller that performs motions with steps
+#: whether a controller performs a motion without a fall and without other steps
+Holds = Callable[[RobotClip, str], bool]
 #: shares of the clip's lengths of steps and of its tempo, the fastest first
 TRIED = sorted(
     [(stride, 1.0) for stride in (1.0, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5, 0.4)]
@@ -203,7 +204,7 @@ def _stepped(
                 lacks[trial.way] = error.by if isinstance(error, NotReached) else np.inf
             continue
         if made.stride * made.tempo >= ENOUGH:
-            if holds is None or holds(made.clip):
+            if holds is None or holds(made.clip, STEPPER):
                 return made
             first = first or made._replace(held=False)
             continue

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from poise.baselines.balance.references.reference_motion import faster
 from poise.baselines.balance.references.robot_clip import RATE, RobotClip, reference_from
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
@@ -41,6 +42,7 @@ Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
 COMES_DOWN, CLIMB = 1.5, 0.2  # [s] in which a foot is down; [legs] that the ground rises at least
 KNEE = 0.12  # [legs] over the floor: a knee that is lower is on the ground
+SLOWER = (1.0, 0.9, 0.8)  # times its speed, at which a walk is tried
 CROSSOVER = 2.0  # f [Hz], what is asked of the body faster than this is smoothed away
 
 
@@ -101,10 +103,10 @@ def retarget_clip(
     None the latter. Where no controller could perform that, or its way or tempo are less than 0.7
     of the clip's, and nothing was asked with `solver`, `constraints` or `planted`, it is the
     former, with what `find_commands` has for a planner that walks. Of what is no faster so either,
-    `about.unperformed` says why. `holds` is asked of motions with steps, as a trial of the
-    controller that performs them: where it says no, steps are slower, down to 0.7 of the clip's,
-    and then walked if a planner takes the clip's own. A clip may be the name of a packaged one, or
-    a path. All else, and what is raised, is as of these two.
+    `about.unperformed` says why. `holds` is asked of motions with steps and of walks, as a trial of
+    the controller that performs them: where it says no, they are slower, down to 0.7 of the clip's
+    speed, and steps are then walked if a planner takes the clip's own. A clip may be the name of a
+    packaged one, or a path. All else, and what is raised, is as of these two.
     """
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
     reason, stepped = "it was retargeted by kinematics alone (--kinematic)", None
@@ -126,7 +128,7 @@ def retarget_clip(
             if asked or error.field not in UNPERFORMED:
                 raise
     free = retarget_freely(clip, robot, smooth=smooth)
-    walked: Walked | None = None
+    walked, held = None, True
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
@@ -134,7 +136,7 @@ def retarget_clip(
             walks = walked_clip(free.clip, found, robot)
             reference_from(walks, robot, clip.name)
             if stepped is None or not found.bound:
-                seen, walked = walks, found
+                seen, walked, held = _held(walks, found, holds)
         except ConfigError as error:
             if error.field == "speed" and not _kneels(clip):
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
@@ -145,7 +147,19 @@ def retarget_clip(
     if walked is None:
         return made._replace(tempo=1.0)
     return made._replace(tempo=walked.tempo, walker=walked.walker, stride=walked.way,
-                         asked=walked.asked, bound=walked.bound)  # fmt: skip
+                         asked=walked.asked, bound=walked.bound, held=held)  # fmt: skip
+
+
+def _held(clip: RobotClip, found: Walked, holds: Holds | None) -> tuple[RobotClip, Walked, bool]:
+    """The fastest walk that holds, at `ENOUGH` of the clip's speed at least; else the fastest."""
+    for pace in SLOWER:
+        if holds is None or found.way * found.tempo * pace < ENOUGH:
+            break
+        assert clip.commands is not None
+        slower = replace(clip, commands=faster(clip.commands, pace), dt=clip.dt / pace)
+        if holds(slower, found.walker):
+            return slower, found._replace(tempo=pace * found.tempo), True
+    return clip, found, holds is None
 
 
 def _climb(clip: Clip) -> str:

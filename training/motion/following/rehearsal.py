@@ -1,4 +1,4 @@
-"""A motion with steps is tried before it is taken."""
+"""A motion with steps, or a walk, is tried before it is taken."""
 
 from collections.abc import Callable
 
@@ -12,22 +12,22 @@ STARTS, SEED = 4, 1  # of a trial; figures are of other seeds
 
 
 def rehearsal(
-    robot: Robot, controller: str = "motion-step", said: Callable[[str], None] | None = None
-) -> Callable[[RobotClip], bool]:
-    """Return `holds` of `retarget_clip`: whether `controller` performs a motion from a few starts
+    robot: Robot, said: Callable[[str], None] | None = None
+) -> Callable[[RobotClip, str], bool]:
+    """Return `holds` of `retarget_clip`: whether a controller performs a motion from a few starts
     without a fall and without steps of its own.
 
     `said` is called with a line before every trial.
     """
 
-    def holds(clip: RobotClip) -> bool:
+    def holds(clip: RobotClip, controller: str) -> bool:
         if said is not None:
             said(f"trying it: {controller}, {STARTS} starts")
         try:
             reference = reference_from(clip, robot, clip.about.name)
         except ConfigError:
             return False
-        trials = follow(reference, controller, robot=robot, starts=STARTS, seed=SEED)
+        trials = follow(reference, controller, robot=robot, starts=STARTS, seed=SEED, patient=False)
         return not any(trial.fallen or trial.interruptions > 0 for trial in trials)
 
     return holds

@@ -96,6 +96,8 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
         print_violations(quality.violations, console)
     if made.clip.about.unperformed:
         console.print(f"Can be seen, but not performed: {escape(made.clip.about.unperformed)}")
+    elif not made.held:
+        console.print("When it was tried, it fell or took steps of its own: --speed slows it down.")
 
 
 def print_violations(violations: Sequence[Violation], console: Console) -> None:

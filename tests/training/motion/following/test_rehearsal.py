@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from poise.baselines.balance.references.robot_clip import RobotClip
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.training.motion.following.rehearsal import STARTS, rehearsal
@@ -23,10 +26,10 @@ def test_a_controller_that_steps_on_its_own_does_not_hold(tmp_path: Path) -> Non
     clip = retarget_clip(make("walk")[0], ROBOT).clip
     timid = tmp_path / "timid.yaml"
     timid.write_text("base: motion-step\nperform:\n  margin: 0.0\n  margin_both: 0.0\n")
-    assert not rehearsal(ROBOT, str(timid))(clip)
+    assert not rehearsal(ROBOT)(clip, str(timid))
     weak = tmp_path / "weak.yaml"
     weak.write_text("base: motion-step\nperform:\n  gain: 0.0\n  margin: 9.0\n  margin_both: 9.0\n")
-    assert not rehearsal(ROBOT, str(weak))(clip)
+    assert not rehearsal(ROBOT)(clip, str(weak))
 
 
 def test_what_does_not_hold_is_slower_and_in_the_end_walked() -> None:
@@ -34,7 +37,7 @@ def test_what_does_not_hold_is_slower_and_in_the_end_walked() -> None:
     clip = make("walk")[0].at_speed(0.9)
     asked: list[RobotClip] = []
 
-    def second(made: RobotClip) -> bool:
+    def second(made: RobotClip, controller: str) -> bool:
         asked.append(made)
         return len(asked) > 1
 
@@ -42,8 +45,26 @@ def test_what_does_not_hold_is_slower_and_in_the_end_walked() -> None:
     slower = retarget_clip(clip, ROBOT, holds=second)
     assert len(asked) == 2 and slower.held
     assert 0.7 <= slower.stride * slower.tempo <= fastest.stride * fastest.tempo
-    walked = retarget_clip(clip, ROBOT, holds=lambda made: False)
-    assert walked.walker == "walk" and not walked.bound
-    kept = retarget_clip(clip, ROBOT, kinematic=False, holds=lambda made: False)
+    walked = retarget_clip(clip, ROBOT, holds=lambda made, controller: controller == "walk")
+    assert walked.walker == "walk" and walked.held and not walked.bound
+    kept = retarget_clip(clip, ROBOT, kinematic=False, holds=lambda made, controller: False)
     assert not kept.held and not kept.walker
     assert kept.stride * kept.tempo == fastest.stride * fastest.tempo
+
+
+def test_a_walk_that_does_not_hold_is_slower() -> None:
+    """Its commands and its time alike, down to 0.7 of the clip's; else the fastest is left."""
+    clip, paces = make("circle")[0], []
+
+    def third(made: RobotClip, controller: str) -> bool:
+        assert made.commands is not None and controller == "walk"
+        paces.append((made.commands[:, 1].max(), 1.0 / made.dt))
+        return len(paces) > 2
+
+    fastest = retarget_clip(clip, ROBOT)
+    slower = retarget_clip(clip, ROBOT, holds=third)
+    assert slower.held and slower.tempo == pytest.approx(0.8 * fastest.tempo)
+    for column in np.array(paces).T:
+        np.testing.assert_allclose(column / column[0], [1.0, 0.9, 0.8])
+    kept = retarget_clip(clip, ROBOT, holds=lambda made, controller: False)
+    assert not kept.held and kept.tempo == fastest.tempo
