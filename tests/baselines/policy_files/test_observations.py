@@ -120,6 +120,8 @@ def test_scale_comes_after_clip() -> None:
         ({"term": "command", "scale": {"lin_vel_x": 2.0, "ang_vel_yaw": 0.5}}, [2.0, 2.0, 1.5]),
         ({"term": "command", "scale": {"left": 3.0}, "pick": (2, 1)}, [3.0, 6.0]),
         ({"term": "velocity_commands", "at_rest": (7.0, 8.0, 9.0)}, [1.0, 2.0, 3.0]),
+        ({"term": "command", "offset": 1.0, "clip": (0.0, 2.5), "scale": 2.0}, [4.0, 5.0, 5.0]),
+        ({"term": "command", "offset": (0.1, -0.2), "pick": (2, 0)}, [3.1, 0.8]),
     ],
 )
 def test_parts_of_terms(fields: dict[str, Any], expected: list[float]) -> None:
@@ -199,6 +201,7 @@ def test_an_input_each() -> None:
         ),
         ({"term": "dof_pos", "scale": {"*_hip": 1.0}}, ("observations[0].scale",)),
         ({"term": "phase", "at_rest": (0.0,)}, ("observations[0].at_rest", "1", "2")),
+        ({"term": "command", "offset": (0.1, 0.2)}, ("observations[0].offset", "2", "3")),
         ({"frame": (ObservationTerm("no"),)}, ("observations[0].frame[0].term",)),
     ],
 )

@@ -38,6 +38,10 @@ T1_ARM = ["Shoulder_Pitch", "Shoulder_Roll", "Elbow_Pitch", "Elbow_Yaw"]
 T1_LEG = ["Hip_Pitch", "Hip_Roll", "Hip_Yaw", "Knee_Pitch", "Ankle_Pitch", "Ankle_Roll"]
 T1 = ["AAHead_yaw", "Head_pitch", *(f"{s}_{j}" for s in ("Left", "Right") for j in T1_ARM), "Waist",
       *(f"{s}_{j}" for s in ("Left", "Right") for j in T1_LEG)]  # fmt: skip
+H1_LEG = ["hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle"]
+H1_ARM = ["shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow"]
+H1 = [*(f"{s}_{j}" for s in ("left", "right") for j in H1_LEG), "torso",
+      *(f"{s}_{j}" for s in ("left", "right") for j in H1_ARM)]  # fmt: skip
 KP = [100, 100, 100, 200, 20, 20] * 2 + [300] * 3 + [90, 60, 20, 60, 4, 4, 4] * 2
 KD = [2.5, 2.5, 2.5, 5, 0.2, 0.1] * 2 + [5] * 3 + [2, 1, 0.4, 1, 0.2, 0.2, 0.2] * 2
 CROUCH = [-0.1, 0, 0, 0.3, -0.2, 0] * 2 + [0] * 17
@@ -72,6 +76,7 @@ class Loop(NamedTuple):
     held: Any = None
     bound: float = np.inf
     adds: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None  # of roll, pitch and gyro
+    grown: float = 1e-4  # rounding after 200 steps; more where the robot rocks on short heels
 
 
 def frame(*parts: Any) -> np.ndarray:
@@ -251,6 +256,20 @@ def unitree_gym() -> Loop:
                      n.action, np.sin(phase), np.cos(phase))  # fmt: skip
 
     return Loop(G1, CROUCH, kp, kd, 0.25, observe, list(range(12)))
+
+
+def unitree_gym_h1() -> Loop:
+    """The same for ten joints; told that it leans back, since the heel here is short."""
+    default = np.array([0, 0, -0.1, 0.3, -0.2] * 2 + [0] * 9)
+    kp = [150, 150, 150, 200, 40] * 2 + [300] + [100, 100, 50, 50] * 2
+    kd = [2, 2, 2, 4, 2] * 2 + [6] + [2] * 8
+
+    def observe(n: Now) -> np.ndarray:
+        phase = 2 * np.pi * (0.02 * (n.step + 1) % 0.8) / 0.8
+        return frame(0.25 * n.gyro, n.gravity - [0.12, 0, 0], [0, 0, 0], (n.q - default)[:10],
+                     0.05 * n.v[:10], n.action, np.sin(phase), np.cos(phase))  # fmt: skip
+
+    return Loop(H1, default, kp, kd, 0.25, observe, list(range(10)))
 
 
 def twist2() -> Loop:
@@ -451,6 +470,7 @@ LOOPS: dict[str, Callable[[], Loop]] = {
     "unitree-dance-g1": unitree_dance,
     "unitree-g1-velocity": unitree_mjlab,
     "unitree-gym-g1": unitree_gym,
+    "unitree-gym-h1": unitree_gym_h1,
     "unitree-lab-g1": unitree_lab,
     "unitree-mjlab-2026-03": unitree_mjlab_2026,
 }
