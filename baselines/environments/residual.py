@@ -163,7 +163,8 @@ class ResidualBalanceEnv(ControlledEnv):
         decides = self._base.unwrapped
         self._handed = decides, self._motion
         if isinstance(decides, ClipWalker):
-            decides.take_clip(self._keeps_arms and self._reference.commands is not None)
+            walked = self._reference.commands is not None and not self._reference.free_arms
+            decides.take_clip(walked and self._keeps_arms)
         if isinstance(decides, Performer):
             decides.perform(self._reference, self._motion.pace)
         elif self._reference.footing is not None:

@@ -1,7 +1,7 @@
 """A reference motion in time: joints, centre of mass and root of one robot; or the commands of a
 step planner over time while the robot performs it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +73,7 @@ class ReferenceMotion(Copyable):
     footing: Footing | None = None  # None: both soles stay planted
     commands: np.ndarray | None = None  # None: it does not walk
     walked: np.ndarray | None = None  # None: not known, or its own soles step
+    free_arms: bool = False  # trunk and arms of a walk balance the robot first
 
     @property
     def footfalls(self) -> np.ndarray:
@@ -99,7 +100,8 @@ class ReferenceMotion(Copyable):
         commands = None if self.commands is None else faster(self.commands, factor)
         walked = None if self.walked is None else self.walked / [factor, 1.0, 1.0, 1.0]
         knots = self.knots / factor
-        return ReferenceMotion(self.name, knots, coeffs, self.loop, footing, commands, walked)
+        return replace(self, knots=knots, coeffs=coeffs, footing=footing, commands=commands,
+                       walked=walked)  # fmt: skip
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""

@@ -29,6 +29,7 @@ LARGEST, UNIT = 1e4, 0.1  # [m, rad] of an entry; by which a quaternion may be o
 MOST = 20_000
 LEVEL = 0.02  # [m] by which a sole may leave the plane of both
 ABOUT, PLANTED, COMMANDS = "about.json", "planted", "commands"
+RARE = ("unperformed", "free_arms")  # of what a file says of itself
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class About:
         robot: its name; fingerprint: of its model.
         name: of the motion; source: of which file; licence: of that.
         unperformed: why no controller can perform it, so that it can only be seen; empty: one may.
+        free_arms: whether trunk and arms balance the robot, where a planner walks.
     """
 
     robot: str
@@ -47,6 +49,7 @@ class About:
     source: str = ""
     licence: str = ""
     unperformed: str = ""
+    free_arms: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +103,7 @@ def write_robot_clip(clip: RobotClip, path: str | Path) -> None:
             member = io.BytesIO()
             np.lib.format.write_array(member, np.ascontiguousarray(array), version=(1, 0))
             archive.writestr(zipfile.ZipInfo(f"{name}.npy"), member.getvalue())
-        said = {k: v for k, v in asdict(clip.about).items() if v or k != "unperformed"}
+        said = {k: v for k, v in asdict(clip.about).items() if v or k not in RARE}
         about = json.dumps(said, ensure_ascii=False, indent=1)
         archive.writestr(zipfile.ZipInfo(ABOUT), about)
     write_atomic(path, content.getvalue())
@@ -190,7 +193,8 @@ def reference_from(
     spline = rest_spline if rest else make_interp_spline  # the latter without a knot near ends
     splines = [spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
-    return ReferenceMotion(clip.about.name, knots, coeffs, False, None, commands, walked)
+    return ReferenceMotion(clip.about.name, knots, coeffs, False, None, commands, walked,
+                           clip.about.free_arms)  # fmt: skip
 
 
 def check_clip_robot(clip: RobotClip, robot: Robot, source: str) -> None:

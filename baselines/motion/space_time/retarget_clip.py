@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -36,7 +37,7 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .walked import Walked, find_commands, walked_clip
+from .walked import LEARNED, Walked, find_commands, walked_clip
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
@@ -151,15 +152,18 @@ def retarget_clip(
 
 
 def _held(clip: RobotClip, found: Walked, holds: Holds | None) -> tuple[RobotClip, Walked, bool]:
-    """The fastest walk that holds, at `ENOUGH` of the clip's speed at least; else the fastest."""
-    for pace in SLOWER:
-        if holds is None or found.way * found.tempo * pace < ENOUGH:
-            break
-        assert clip.commands is not None
-        slower = replace(clip, commands=faster(clip.commands, pace), dt=clip.dt / pace)
+    """The fastest walk that holds, at `ENOUGH` of the clip's speed at least, if need be with arms
+    that balance the robot; else the fastest."""
+    if holds is None or clip.commands is None:
+        return clip, found, True
+    paces = [pace for pace in SLOWER if found.way * found.tempo * pace >= ENOUGH]
+    arms = (False,) if found.walker == LEARNED else (False, True)  # its own are free always
+    for free, pace in product(arms, paces):
+        slower = replace(clip, about=replace(clip.about, free_arms=free), dt=clip.dt / pace,
+                         commands=faster(clip.commands, pace))  # fmt: skip
         if holds(slower, found.walker):
             return slower, found._replace(tempo=pace * found.tempo), True
-    return clip, found, holds is None
+    return clip, found, False
 
 
 def _climb(clip: Clip) -> str:

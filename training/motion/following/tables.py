@@ -130,6 +130,7 @@ def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
     less = "" if made.stride == 1.0 else f", its steps {made.stride:.2f} of their length"
     flies = "off the ground in the clip, performed as a walk, " if run else ""
     other = f"; its steps are not the clip's ({made.bound})" if made.bound else ""
+    other += "; trunk and arms balance the robot" if made.clip.about.free_arms else ""
     return [
         (
             "performed by a planner that walks",

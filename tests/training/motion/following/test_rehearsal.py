@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.baselines.balance.references.robot_clip import RobotClip
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.robot_clip import RobotClip, write_robot_clip
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.training.motion.following.rehearsal import STARTS, rehearsal
 from tests.support.captures import make
@@ -52,12 +53,13 @@ def test_what_does_not_hold_is_slower_and_in_the_end_walked() -> None:
     assert kept.stride * kept.tempo == fastest.stride * fastest.tempo
 
 
-def test_a_walk_that_does_not_hold_is_slower() -> None:
-    """Its commands and its time alike, down to 0.7 of the clip's; else the fastest is left."""
+def test_a_walk_that_does_not_hold_is_slower(tmp_path: Path) -> None:
+    """Its commands and its time alike, down to 0.7 of the clip's, then with arms that balance the
+    robot; else the fastest is left."""
     clip, paces = make("circle")[0], []
 
     def third(made: RobotClip, controller: str) -> bool:
-        assert made.commands is not None and controller == "walk"
+        assert made.commands is not None and controller == "walk" and not made.about.free_arms
         paces.append((made.commands[:, 1].max(), 1.0 / made.dt))
         return len(paces) > 2
 
@@ -66,5 +68,9 @@ def test_a_walk_that_does_not_hold_is_slower() -> None:
     assert slower.held and slower.tempo == pytest.approx(0.8 * fastest.tempo)
     for column in np.array(paces).T:
         np.testing.assert_allclose(column / column[0], [1.0, 0.9, 0.8])
+    free = retarget_clip(clip, ROBOT, holds=lambda made, controller: made.about.free_arms)
+    assert free.held and free.tempo == fastest.tempo
+    write_robot_clip(free.clip, tmp_path / "free.npz")
+    assert load_motion(tmp_path / "free.npz", ROBOT).at_speed(0.9).free_arms
     kept = retarget_clip(clip, ROBOT, holds=lambda made, controller: False)
-    assert not kept.held and kept.tempo == fastest.tempo
+    assert not kept.held and kept.tempo == fastest.tempo and not kept.clip.about.free_arms

@@ -287,6 +287,9 @@ def test_trunk_and_arms_of_a_walk_are_the_clip_s(tmp_path: Path) -> None:
     assert (walker.gait_sets.posture.weight > free).sum() == len(
         walker.gait_sets.posture.weight
     ) - 6 - 12 - 3
+    env.motion = replace(reference, free_arms=True)
+    np.testing.assert_array_equal(walker.gait_sets.posture.weight, free)
+    env.motion = reference
     env.motion = load_motion("standing", robot)
     np.testing.assert_array_equal(walker.gait_sets.posture.weight, free)
 
