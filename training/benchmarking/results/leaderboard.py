@@ -43,7 +43,7 @@ PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard
 SCENARIO_PAGE = Path("docs/scenarios.md")
 COLUMNS = {"recovered, mix", *IN_PAIRS, *(each.heading for each in (
     J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, NOT_FALLEN, ROOT, TICK))}  # fmt: skip
-MOST_COLUMNS = 10  # controllers beside each other in a page's table of factors
+MOST_COLUMNS = 8  # controllers beside each other in a page's table of factors
 SAME: Final = ("suite", "seed", "robot", "reference")  # of results that may stand in one table
 
 
