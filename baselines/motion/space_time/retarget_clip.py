@@ -105,7 +105,7 @@ def retarget_clip(
     of the clip's, and nothing was asked with `solver`, `constraints` or `planted`, it is the
     former, with what `find_commands` has for a planner that walks. Of what is no faster so either,
     `about.unperformed` says why. `holds` is asked of motions with steps and of walks, as a trial of
-    the controller that performs them: where it says no, they are slower, down to 0.7 of the clip's
+    the controller that performs them: where it says less than 1, they are slower, down to 0.7 of the clip's
     speed, and steps are then walked if a planner takes the clip's own. A clip may be the name of a
     packaged one, or a path. All else, and what is raised, is as of these two.
     """
@@ -153,17 +153,21 @@ def retarget_clip(
 
 def _held(clip: RobotClip, found: Walked, holds: Holds | None) -> tuple[RobotClip, Walked, bool]:
     """The fastest walk that holds, at `ENOUGH` of the clip's speed at least, if need be with arms
-    that balance the robot; else the fastest."""
+    that balance the robot; else the one that holds longest."""
     if holds is None or clip.commands is None:
         return clip, found, True
+    most, best = 0.0, (clip, found, False)
     paces = [pace for pace in SLOWER if found.way * found.tempo * pace >= ENOUGH]
     arms = (False,) if found.walker == LEARNED else (False, True)  # its own are free always
     for free, pace in product(arms, paces):
         slower = replace(clip, about=replace(clip.about, free_arms=free), dt=clip.dt / pace,
                          commands=faster(clip.commands, pace))  # fmt: skip
-        if holds(slower, found.walker):
-            return slower, found._replace(tempo=pace * found.tempo), True
-    return clip, found, False
+        share, slow = holds(slower, found.walker), found._replace(tempo=pace * found.tempo)
+        if share >= 1.0:
+            return slower, slow, True
+        if share > most:
+            most, best = share, (slower, slow, False)
+    return best
 
 
 def _climb(clip: Clip) -> str:

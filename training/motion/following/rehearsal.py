@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from poise.baselines.balance.references.robot_clip import RobotClip, reference_from
+from poise.baselines.motion.retargeting.retarget import Holds
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
@@ -11,23 +12,22 @@ from .follow import follow
 STARTS, SEED = 16, 1  # of a trial; figures are of other seeds
 
 
-def rehearsal(
-    robot: Robot, said: Callable[[str], None] | None = None
-) -> Callable[[RobotClip, str], bool]:
-    """Return `holds` of `retarget_clip`: whether a controller performs a motion from a few starts
-    without a fall and without steps of its own.
+def rehearsal(robot: Robot, said: Callable[[str], None] | None = None) -> Holds:
+    """Return `holds` of `retarget_clip`: the share of a few starts until the first from which a
+    controller that performs a motion falls or takes steps of its own; 1 where it does not.
 
     `said` is called with a line before every trial.
     """
 
-    def holds(clip: RobotClip, controller: str) -> bool:
+    def holds(clip: RobotClip, controller: str) -> float:
         if said is not None:
             said(f"trying it: {controller}, {STARTS} starts")
         try:
             reference = reference_from(clip, robot, clip.about.name)
         except ConfigError:
-            return False
+            return 0.0
         trials = follow(reference, controller, robot=robot, starts=STARTS, seed=SEED, patient=False)
-        return not any(trial.fallen or trial.interruptions > 0 for trial in trials)
+        fine = [not (trial.fallen or trial.interruptions > 0) for trial in trials]
+        return 1.0 if all(fine) else fine.index(False) / STARTS
 
     return holds
