@@ -191,8 +191,11 @@ def _stepped(
 
     slow: Retargeted | None = None
     first: Retargeted | None = None  # the fastest of those that do not hold
+    tried: set[tuple[float, float]] = set()  # ways of those
     lacks: dict[tuple[float, float], float] = {}  # by way: what is lacking, at the lowest CoM
     for trial in _trials():
+        if trial.way in tried:
+            continue
         if trial.sink and (first is not None or lacks.get(trial.way, np.inf) > NEARLY):
             continue
         if (slow or first) is not None and trial.stride * trial.tempo < ENOUGH:
@@ -209,6 +212,7 @@ def _stepped(
             if holds is None or holds(made.clip, STEPPER) >= 1.0:
                 return made
             first = first or made._replace(held=False)
+            tried.add(trial.way)
             continue
         slow = slow or made._replace(bound=bound)
     found = first or slow

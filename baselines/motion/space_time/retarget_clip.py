@@ -105,9 +105,9 @@ def retarget_clip(
     of the clip's, and nothing was asked with `solver`, `constraints` or `planted`, it is the
     former, with what `find_commands` has for a planner that walks. Of what is no faster so either,
     `about.unperformed` says why. `holds` is asked of motions with steps and of walks, as a trial of
-    the controller that performs them: where it says less than 1, they are slower, down to 0.7 of the clip's
-    speed, and steps are then walked if a planner takes the clip's own. A clip may be the name of a
-    packaged one, or a path. All else, and what is raised, is as of these two.
+    the controller that performs them: where it says less than 1, they are slower, down to 0.7 of
+    the clip's speed, and steps are then walked if a planner takes the clip's own. A clip may be the
+    name of a packaged one, or a path. All else, and what is raised, is as of these two.
     """
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
     reason, stepped = "it was retargeted by kinematics alone (--kinematic)", None

@@ -8,18 +8,24 @@ import pytest
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.robot_clip import RobotClip, write_robot_clip
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
-from poise.training.motion.following.rehearsal import STARTS, rehearsal
+from poise.training.motion.following import rehearsal as rehearsals
+from poise.training.motion.following.rehearsal import rehearsal
 from tests.support.captures import make
 from tests.support.physics import robot_named
 
 ROBOT = robot_named("humanoid")
 
 
+@pytest.fixture(autouse=True)
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rehearsals, "STARTS", 2)
+
+
 def test_a_motion_that_is_kept_holds() -> None:
     said: list[str] = []
     made = retarget_clip(make("walk")[0], ROBOT, holds=rehearsal(ROBOT, said=said.append))
     assert made.held and not made.walker and made.clip.planted is not None
-    assert said == [f"trying it: motion-step, {STARTS} starts"]
+    assert said == ["trying it: motion-step, 2 starts"]
 
 
 def test_a_controller_that_steps_on_its_own_does_not_hold(tmp_path: Path) -> None:
@@ -33,8 +39,9 @@ def test_a_controller_that_steps_on_its_own_does_not_hold(tmp_path: Path) -> Non
     assert 0.0 <= rehearsal(ROBOT)(clip, str(weak)) < 1.0
 
 
+@pytest.mark.weekly
 def test_what_does_not_hold_is_slower_and_in_the_end_walked() -> None:
-    """By a planner that takes the clip's own steps; else the fastest is left."""
+    """By a planner that takes the clip's own steps."""
     clip = make("walk")[0].at_speed(0.9)
     asked: list[RobotClip] = []
 
@@ -48,9 +55,6 @@ def test_what_does_not_hold_is_slower_and_in_the_end_walked() -> None:
     assert 0.7 <= slower.stride * slower.tempo <= fastest.stride * fastest.tempo
     walked = retarget_clip(clip, ROBOT, holds=lambda made, controller: controller == "walk")
     assert walked.walker == "walk" and walked.held and not walked.bound
-    kept = retarget_clip(clip, ROBOT, kinematic=False, holds=lambda made, controller: False)
-    assert not kept.held and not kept.walker
-    assert kept.stride * kept.tempo == fastest.stride * fastest.tempo
 
 
 def test_a_walk_that_does_not_hold_is_slower(tmp_path: Path) -> None:
