@@ -56,6 +56,7 @@ def test_a_controller_stands_by_sensors_alone(tmp_path):
     assert run("measured_mujoco.py", tmp_path).startswith("momentum-qp stands\n")
 
 
+@pytest.mark.weekly  # tests/training/deploy/lowcmd stands a G1 so
 def test_a_controller_stands_on_messages(tmp_path):
     """A pushed G1, which has no sensors of force, stands in `field`."""
     said = "momentum-qp-g1 by torques stands after 4 s in field\n"

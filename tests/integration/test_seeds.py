@@ -117,8 +117,9 @@ def test_a_command_of_two_rows_has_the_figures_of_both() -> None:
     assert [run.figures for run in runs_of(rows)] == [(one, other)]
 
 
-@pytest.mark.parametrize("run", DAILY, ids=[run.run for run in DAILY])
+@pytest.mark.parametrize("run", DAILY[::3], ids=[run.run for run in DAILY[::3]])
 def test_daily_figures_hold(run, tmp_path: Path) -> None:
+    """A third of them: the weekly test below has all."""
     code, output = run_here(run, prepare(tmp_path))
     assert list(faults(run, code, output)) == []
 

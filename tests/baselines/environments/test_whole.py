@@ -17,6 +17,7 @@ from poise.envs.balance.vector.batch import EnvBatch, replicate
 from poise.envs.sensing.realism import load_realism
 from tests.support.refused import invalid
 from tests.support.shared import robot
+from tests.support.weekly import daily
 
 PUSH = {"impulse": 25.0, "direction": 30.0, "duration": 0.1, "start": 0.1, "body": "torso"}
 SHORT = {"duration": 1.0, "pushes": None}
@@ -86,7 +87,7 @@ def test_servos_take_over_sooner_where_the_robot_is_uncertain():
         ResidualWholeEnv(robot(), hand_over={"uncertain": 0.0}, **SHORT)
 
 
-@pytest.mark.parametrize("share", [0.3, 1.0])
+@pytest.mark.parametrize("share", daily([0.3, 1.0]))
 def test_torques_are_shared(share):
     """τ = (1 − w) τ_c + w clip(K (q* − q) − D q̇, ± τ_max), in every physics step."""
     env = ResidualWholeEnv(robot(), controller=FAST, hand_over={"opens": 0.02, "closes": 0.01},

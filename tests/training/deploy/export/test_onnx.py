@@ -21,6 +21,7 @@ from poise.training.learning.policy import ACTIVATIONS, Policy
 from tests.support.exported import SHIPPED, SYMMETRIC, policy, spoiled
 from tests.support.policies import onnx, onnx_session
 from tests.support.shared import robot
+from tests.support.weekly import daily
 
 safetensors = pytest.importorskip("safetensors.numpy")
 
@@ -34,7 +35,7 @@ def normalised(policy: Policy, seen: np.ndarray) -> np.ndarray:
     return (seen - policy.mean) * policy.scale
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, "run"])
+@pytest.mark.parametrize("name", daily(["run", *SHIPPED], 6))
 def test_onnx_acts_as_the_policy(name: str, tmp_path: Path) -> None:
     """On observations within and beyond the limits of the normalised one, to 1e-6."""
     count = COUNT // 5

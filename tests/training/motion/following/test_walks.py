@@ -253,7 +253,7 @@ def test_a_slow_run_is_walked_without_a_fall(speed: float, walker: str, starts: 
 
 
 @STARTS
-@pytest.mark.parametrize("name", ["circle", "turn-in-place", "backwards"])
+@pytest.mark.parametrize("name", daily(["circle", "turn-in-place", "backwards"]))
 def test_walks_and_turns_are_performed(name: str, starts: int, tmp_path: Path) -> None:
     """As far as the clip goes, and as far round, from disturbed starts without a fall."""
     clip = walking(name)

@@ -120,8 +120,8 @@ def test_the_same_folder_gives_the_same_file(
     written: Callable[[str], Path], tmp_path: Path
 ) -> None:
     """No date, no random name."""
-    again = write_report(finished("random"), tmp_path / "again.html")
-    assert again.read_bytes() == written("random").read_bytes()
+    again = write_report(finished("benchmark"), tmp_path / "again.html")
+    assert again.read_bytes() == written("benchmark").read_bytes()
 
 
 def test_without_a_renderer_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
