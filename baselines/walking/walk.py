@@ -110,6 +110,7 @@ class Walk(Commanded, CaptureStep):
         self.reference = allocate_reference(robot, gait.qp.period, legs)
         self.arms = swinging_arms(robot, self.gait_sets.posture.weight, gait.arm_weight)
         self._posture_weight = self.gait_sets.posture.weight.copy()
+        self._takes_clip = False
         super().__init__(robot, config)
 
     @property
@@ -149,11 +150,13 @@ class Walk(Commanded, CaptureStep):
     def take_clip(self, walked: bool) -> None:
         """Hold trunk and arms to the targets' by the gait's `clip_weight` where a clip is walked;
         else arms are free to balance the robot."""
-        weight, least = self._posture_weight.copy(), 0.0
+        if walked == self._takes_clip:
+            return
+        weight, self._takes_clip = self._posture_weight.copy(), walked
         if walked:
+            others = 6 + PlantedLegs(self.robot).others
             least = self._level_gait.clip_weight / self.robot.units.omega**4
-        others = PlantedLegs(self.robot).others
-        weight[6:][others] = np.maximum(weight[6:][others], least)
+            weight[others] = np.maximum(weight[others], least)
         self.arms = swinging_arms(self.robot, weight, self._level_gait.arm_weight)
         self.gait_sets.posture.weight[:], self._walk_tick = weight, None
 
