@@ -169,6 +169,7 @@ print("works")
 """
 
 
+@pytest.mark.weekly  # the commands below are of the core, too
 def test_the_core_works_without_motion(without_motion: Path, tmp_path: Path) -> None:
     """Environments and the QP, with every import of the extra forbidden."""
     assert run(without_motion, CORE, tmp_path) == "works\n"

@@ -33,7 +33,7 @@ from tests.support.weekly import daily
 
 PATIENCE = 120.0  # [s] until a process counts as hung
 OF_CONTROLLERS = [name for name in KINDS if name.startswith("env of ")]  # alike but for these
-PLAYED = [*(name for name in KINDS if name not in OF_CONTROLLERS), *daily(OF_CONTROLLERS, 3)]
+PLAYED = [*(name for name in KINDS if name not in OF_CONTROLLERS), *daily(OF_CONTROLLERS)]
 
 
 def pickled(it: Any) -> Any:

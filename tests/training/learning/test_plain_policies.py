@@ -17,6 +17,7 @@ from poise.training.learning.policy import load_policy
 from poise.training.learning.policy_files import POLICY, STATISTICS
 from poise.training.learning.train import train
 from tests.support.shared import finished_run, policies_here, robot, robot_of, tiny_config
+from tests.support.weekly import daily
 
 SHIPPED = policies_here()
 
@@ -45,7 +46,7 @@ def contents(path: Path) -> list[bytes]:
     return [*members, *(base64.b64decode(text) for text in pickles)]
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, "run", "symmetric"])
+@pytest.mark.parametrize("name", daily(["run", "symmetric", *SHIPPED], 7))
 def test_nothing_of_poise_is_pickled(name: str, request: pytest.FixtureRequest) -> None:
     path = folder_of(name, request) / POLICY
     assert not [content for content in contents(path) if b"poise" in content.lower()]

@@ -19,6 +19,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.physics.simulation import Simulation
 from tests.support.shared import robot
+from tests.support.weekly import daily
 
 
 @pytest.fixture
@@ -85,7 +86,7 @@ def test_every_packaged_controller_takes_a_light_push(name):
     assert getattr(env.controller, "failures", 0) == 0
 
 
-@pytest.mark.parametrize("name", sorted(set(packaged("controllers")) - {"get-up"}))
+@pytest.mark.parametrize("name", daily(sorted({*packaged("controllers")} - {"get-up"}), 8))
 def test_every_packaged_controller_suits_another_robot(name):
     """Gains are scaled by mass and height: `tall` stands for half a second. The postures of
     `get-up` name joints of the humanoid.

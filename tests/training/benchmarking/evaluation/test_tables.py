@@ -17,6 +17,7 @@ from poise.training.benchmarking.evaluation.tables import (
     shared_ranks,
 )
 from poise.training.running.summary import Entry, Summary
+from tests.support.weekly import daily
 
 RESULTS = sorted((Path(__file__).parents[4] / "docs/results").rglob("*.json"))
 EDGES = "│┃┓┐┩┘┛"
@@ -57,7 +58,7 @@ def test_without_a_j50_the_rate_decides() -> None:
     assert ranked(some) == ["b", "a"] and shared_ranks(some) == {"a": 2, "b": 1}
 
 
-@pytest.mark.parametrize("width", [80, 100, 120])
+@pytest.mark.parametrize("width", daily([80, 120, 100], 2))
 @pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
 def test_tables_fold_and_are_not_cut(path: Path, width: int) -> None:
     """A console that is too narrow for them shows every cell, and the right edge."""

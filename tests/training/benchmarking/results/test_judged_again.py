@@ -19,9 +19,9 @@ from poise.training.benchmarking.trials.trial import Outcome
 from tests.support.evaluations import InProcess, write_suite
 
 SUITE = {
-    "duration": 8.0,
+    "duration": 6.5,
     "walk_push": {"directions": 2, "impulses": [0.1, 1.6], "first_trials": 2, "trials": 1,
-                  "start": 4.5, "window": 1.0},
+                  "start": 3.0, "window": 1.0},
 }  # fmt: skip
 ADDED = ("own_speed_error", "own_turn_error", "last_speed_error", "last_turn_error")
 

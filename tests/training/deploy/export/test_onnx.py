@@ -114,7 +114,7 @@ def listed(text: str) -> list[str]:
     return text.split(",")
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", daily(SHIPPED, 6))
 def test_metadata_say_what_is_observed_and_what_an_action_does(name: str, tmp_path: Path) -> None:
     """As many entries as the network has; in mjlab's words, where it has one."""
     env = policy(name).make_env(robot=robot(policy(name).config.robot))

@@ -30,6 +30,7 @@ from poise.training.learning.tuning.tasks import TuneConfig, TuningPushes, Tunin
 from tests.support.evaluations import InProcess
 from tests.support.rivals import KNOWN, allowed, network
 from tests.support.shared import robot
+from tests.support.weekly import daily
 
 
 def small(**changes):
@@ -95,7 +96,7 @@ def test_limits_follow_what_is_recovered():
     np.testing.assert_allclose(found, [10.0 * np.exp(0.05), 20.0, 30.0 * np.exp(-0.05)])
 
 
-@pytest.mark.parametrize("name", packaged("tuning"))
+@pytest.mark.parametrize("name", daily(packaged("tuning"), 5))
 def test_packaged_ranges(name, monkeypatch):
     """All are numbers of the controller, and hold where the search starts from.
 
