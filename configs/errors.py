@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 
-LONGEST_TEXT = 1300  # characters of each part of an error
+LONGEST_TEXT = 1220  # characters of each part of an error
 LONGEST_VALUE = 160  # characters of a value in an error
 MOST_CHOICES = 90
 _BREAKS = re.compile(r"\s*[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]\s*")

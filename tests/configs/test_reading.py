@@ -22,7 +22,7 @@ from poise.baselines.environments.guard.config import guard_config
 from poise.baselines.motion.space_time.constraints.constraint import read_constraints
 from poise.baselines.registry import controller_config
 from poise.configs.archives import MEMBERS, UNPACKED_BYTES, Archive, read_arrays
-from poise.configs.errors import LONGEST_TEXT, ConfigError, PoiseError, shown
+from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import (
     MIB,
@@ -353,11 +353,10 @@ def test_values_in_errors_are_short() -> None:
 
 def test_errors_are_one_line_whatever_they_hold() -> None:
     """Line breaks, escapes and a million characters in each of its parts."""
-    most = 4 * LONGEST_TEXT + 100  # four parts, and what joins them
     for part in ("a\nb\r\nc", "\x1b[31m\0\ud800", "x" * 10**6):
         error = ConfigError(part, source=part, field=part, choices=[part] * 1000)
-        assert str(error).isprintable() and len(str(error)) < most
-        assert str(PoiseError(part)).isprintable() and len(str(PoiseError(part))) < most
+        assert str(error).isprintable() and len(str(error)) < 5000
+        assert str(PoiseError(part)).isprintable() and len(str(PoiseError(part))) < 5000
     assert str(ConfigError("a  b", source="c  d")) == "c  d: a  b"
 
 

@@ -15,11 +15,11 @@ from tests.support.shared import generic_state, robot
 OMEGA, LEAST = 3.5, 0.4
 
 
-def law(size: float, command: tuple[float, ...] = (0.0, 0.0, 0.0), least: float = LEAST):
+def law(size: float, command: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Smoothing:
     """A state that turns at `size` of the threshold, at a generic angle."""
     state = generic_state(seed=1).state_arrays
     state.qvel[3:5] = size * FELT * OMEGA * np.array([np.cos(2.0), np.sin(2.0)])
-    return Smoothing(state, np.array([*command, 0.0, 0.0, 0.0, 0.0, 0.0]), least, OMEGA)
+    return Smoothing(state, np.array([*command, 0.0, 0.0, 0.0, 0.0, 0.0]), LEAST, OMEGA)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,6 @@ from poise.envs.viewing.appearance import FIELD_OF_VIEW
 from poise.envs.viewing.overlays import push_arrows
 from poise.envs.viewing.renderer import Camera, SceneRenderer
 from tests.support.small_biped import write_biped
-from tests.support.weekly import daily
 
 PUSH = {"impulse": 14.0, "direction": 90.0, "duration": 0.1, "start": 0.04, "body": "torso"}
 
@@ -220,7 +219,7 @@ def test_every_body_is_visible(name):
         model.geom_group[:] = hidden
 
 
-@pytest.mark.parametrize("backend", daily(["disable", "glfw"]))
+@pytest.mark.parametrize("backend", ["disable", "glfw"])
 def test_missing_opengl_is_one_clear_error(backend):
     """It names the package and the variable, the second time too; nothing else is printed.
 

@@ -16,12 +16,11 @@ from tests.performance.motion_mutations import (
     play_graph,
     play_script,
 )
-from tests.support.weekly import daily
 
 CASES = 100
 
 
-@pytest.mark.parametrize("play", daily([play_script, play_graph]))
+@pytest.mark.parametrize("play", [play_script, play_graph])
 def test_damage_ends_in_a_motion_or_in_one_line(play) -> None:
     counts = Counter(outcome(play, seed) for seed in range(CASES))
     assert counts["taken"] > 0 and counts["refused"] > CASES // 2

@@ -1,5 +1,6 @@
 """training/motion/following/rehearsal.py: steps that fail are slower, or walked."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,11 @@ from tests.support.physics import robot_named
 ROBOT = robot_named("humanoid")
 
 
-@pytest.fixture(autouse=True)
-def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rehearsals, "STARTS", 2)
+@pytest.fixture(autouse=True, scope="module")
+def few() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rehearsals, "STARTS", 2)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +33,7 @@ def said() -> list[str]:
 @pytest.fixture(scope="module")
 def made(said: list[str]) -> RetargetedClip:
     """A walk with steps of its own."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rehearsals, "STARTS", 2)
-        return retarget_clip(make("walk")[0], ROBOT, holds=rehearsal(ROBOT, said=said.append))
+    return retarget_clip(make("walk")[0], ROBOT, holds=rehearsal(ROBOT, said=said.append))
 
 
 def test_a_motion_that_is_kept_holds(made: RetargetedClip, said: list[str]) -> None:
