@@ -33,6 +33,7 @@ from .planner.treads import feet_are_level, footholds_given, lean_ahead, meet_tr
 LOADED, UNLOADED = 1.5, 1.15  # rates at which the load may go to a foot, and must leave one [1/T_d]
 HELD_UP = 0.013  # [h] above where the swing leads it: the ground holds the foot up
 FLAT = 0.978  # cosine of 12°, the most that a sole is tilted then
+LATE = 0.5  # of a swing, after which another step time counts for the next one
 LEAST_LOAD = 0.03  # [m g] that a foot may bear until it leaves
 
 
@@ -59,6 +60,7 @@ def start_walking(t: WalkTick) -> None:
     m.foot, m.recovering, m.corners = 1 - first, 1, 0
     g.walking, g.starting, g.clock, g.step_clock = 1, 1, 0.0, -1.0
     g.caught = 0
+    g.asked_step_time = g.commanded_step_time
     for a in range(3):
         g.velocity[a] = 0.0
     g.error[0] = g.error[1] = 0.0
@@ -72,6 +74,9 @@ def follow_command(t: WalkTick) -> None:
     for a in range(3):
         most = dt * (g.turn_acceleration if a == 2 else g.acceleration)
         g.velocity[a] += min(max(g.command[a] - g.velocity[a], -most), most)
+    w = t.walk.swing
+    if t.walk.memory.swinging == 0 or w.time < LATE * w.duration:
+        g.asked_step_time = g.commanded_step_time
     for a in range(2):
         g.planned[a] = g.velocity[a] + g.error[a]
     if footholds_given(t):

@@ -28,9 +28,22 @@ SHORTER, SHORTEST = 0.94, 0.3  # by which ways are shortened until legs reach, a
 #: the robot's limbs, what they are to do from standing to standing, and whether the feet step
 AskedOf = tuple[Limbs, BodyTargets, bool]
 STEPPER = "motion-step"  # the controller that performs motions with steps
-#: the share of trials until the first one in which a controller that performs a motion falls or
-#: takes other steps; 1: none does
-Holds = Callable[[RobotClip, str], float]
+
+
+class Rehearsed(NamedTuple):
+    """Trials of a controller that performs a motion.
+
+    Attributes:
+        share: of the trials until the first one in which it falls, or a planner of its own takes
+            the steps; 1: in none.
+        kept: mean share of the motion's steps that were taken; 1 of a motion without steps.
+    """
+
+    share: float
+    kept: float = 1.0
+
+
+Holds = Callable[[RobotClip, str], Rehearsed]
 #: shares of the clip's lengths of steps and of its tempo, the fastest first
 TRIED = sorted(
     [(stride, 1.0) for stride in (1.0, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5, 0.4)]
@@ -62,7 +75,7 @@ class Retargeted(NamedTuple):
         bound: what keeps it from 0.7 of the clip's speed; empty where nothing does.
         sunk: by how much the CoM is lower than planned where legs would not reach [m].
         spread: share of the clip's width of steps that is kept.
-        held: False where `holds` never said 1 of a motion that it was asked of.
+        held: False where a trial failed of every motion that `holds` was asked of.
     """
 
     clip: RobotClip
@@ -115,7 +128,7 @@ def retarget_to(
 ) -> Retargeted:  # fmt: skip
     """`retarget` for what `targets_on` has found with the same arguments; raises what it does.
 
-    Steps are slower where `holds` says less than 1 of them; where it never says 1, they are the
+    Steps are slower where a trial of them by `holds` fails; where one always does, they are the
     fastest.
     """
     limbs, whole, steps = asked
@@ -209,7 +222,7 @@ def _stepped(
                 lacks[trial.way] = error.by if isinstance(error, NotReached) else np.inf
             continue
         if made.stride * made.tempo >= ENOUGH:
-            if holds is None or holds(made.clip, STEPPER) >= 1.0:
+            if holds is None or holds(made.clip, STEPPER).share >= 1.0:
                 return made
             first = first or made._replace(held=False)
             tried.add(trial.way)

@@ -11,7 +11,7 @@ from poise.envs.robots.robot import Robot
 
 FIRST_STEP = 1.5  # swings from a command to the first touchdown: the weight shifts before
 BOTH = 0.13  # [1/ω] on both feet between two swings of packaged gaits
-SOONER = 0.012  # [s] by which a step is shorter than these together: a sole touches early
+EARLY = 0.005  # [s] by which a step is shorter than these together: a sole touches early
 
 
 def in_step(clip: RobotClip, robot: Robot) -> RobotClip:
@@ -30,7 +30,7 @@ def in_step(clip: RobotClip, robot: Robot) -> RobotClip:
         return clip
     _, commands = whole_walk(robot, clip.qpos, clip.dt, clip.commands)
     wanted = float(WalkCommand(*commands[1]).start) + float(lands[0, 0] + 1) * clip.dt
-    first, period = SHIFT + FIRST_STEP * swing, swing + BOTH / robot.omega - SOONER
+    first, period = SHIFT + FIRST_STEP * swing, swing + BOTH / robot.omega - EARLY
     steps = max(math.ceil((wanted - first) / period), 0)
     begins = 0 if float(row.left) > 0.0 else 1  # the foot of the side that it goes to, or the right
     steps += (steps + begins + int(lands[0, 1])) % 2

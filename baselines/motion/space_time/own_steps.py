@@ -10,13 +10,12 @@ from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .in_step import BOTH
+from .in_step import BOTH, EARLY
 from .walk_limits import WalkLimits, limits_of_walk
 
 SHARE = 0.7  # of a clip's way times its tempo, from which its own steps are taken
 #: [h] of a step that lasts as the clip's, and [hω] of its speed, at most: less is safer
 OWN = ((0.6, 0.36), (0.66, 0.4))
-EARLY = 0.02  # [s] by which soles touch early
 TOGETHER = 0.15  # [s] between two feet that land at once
 ASIDE_STEP, BACK_STEP = 0.27, 0.68  # [h] that a planner steps to a side or back, at most
 CHANGE, BEHIND = 0.03, 0.2  # [g] by which a planner's speed changes; [hω] that it may lag

@@ -3,14 +3,12 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
-from poise.baselines.balance.references.reference_motion import faster
 from poise.baselines.balance.references.robot_clip import RATE, RobotClip, reference_from
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
@@ -37,13 +35,13 @@ from poise.baselines.motion.space_time.constraints.scene import Scene
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .walked import LEARNED, Walked, find_commands, walked_clip
+from .tried import held_walk
+from .walked import find_commands, walked_clip
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
 COMES_DOWN, CLIMB = 1.5, 0.2  # [s] in which a foot is down; [legs] that the ground rises at least
 KNEE = 0.12  # [legs] over the floor: a knee that is lower is on the ground
-SLOWER = (1.0, 0.9, 0.8)  # times its speed, at which a walk is tried
 CROSSOVER = 2.0  # f [Hz], what is asked of the body faster than this is smoothed away
 
 
@@ -105,8 +103,9 @@ def retarget_clip(
     of the clip's, and nothing was asked with `solver`, `constraints` or `planted`, it is the
     former, with what `find_commands` has for a planner that walks. Of what is no faster so either,
     `about.unperformed` says why. `holds` is asked of motions with steps and of walks, as a trial of
-    the controller that performs them: where it says less than 1, they are slower, down to 0.7 of
-    the clip's speed, and steps are then walked if a planner takes the clip's own. A clip may be the
+    the controller that performs them: where one fails, they are slower, down to 0.7 of the clip's
+    speed, steps are then walked if a planner takes the clip's own, and other ways to
+    walk are tried (`held_walk`). A clip may be the
     name of a packaged one, or a path. All else, and what is raised, is as of these two.
     """
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
@@ -137,7 +136,9 @@ def retarget_clip(
             walks = walked_clip(free.clip, found, robot)
             reference_from(walks, robot, clip.name)
             if stepped is None or not found.bound:
-                seen, walked, held = _held(walks, found, holds)
+                seen, walked = walks, found
+                if holds is not None:
+                    seen, walked, held = held_walk(clip, found, free, robot, holds)
         except ConfigError as error:
             if error.field == "speed" and not _kneels(clip):
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
@@ -149,25 +150,6 @@ def retarget_clip(
         return made._replace(tempo=1.0)
     return made._replace(tempo=walked.tempo, walker=walked.walker, stride=walked.way,
                          asked=walked.asked, bound=walked.bound, held=held)  # fmt: skip
-
-
-def _held(clip: RobotClip, found: Walked, holds: Holds | None) -> tuple[RobotClip, Walked, bool]:
-    """The fastest walk that holds, at `ENOUGH` of the clip's speed at least, if need be with arms
-    that balance the robot; else the one that holds longest."""
-    if holds is None or clip.commands is None:
-        return clip, found, True
-    most, best = 0.0, (clip, found, False)
-    paces = [pace for pace in SLOWER if found.way * found.tempo * pace >= ENOUGH]
-    arms = (False,) if found.walker == LEARNED else (False, True)  # its own are free always
-    for free, pace in product(arms, paces):
-        slower = replace(clip, about=replace(clip.about, free_arms=free), dt=clip.dt / pace,
-                         commands=faster(clip.commands, pace))  # fmt: skip
-        share, slow = holds(slower, found.walker), found._replace(tempo=pace * found.tempo)
-        if share >= 1.0:
-            return slower, slow, True
-        if share > most:
-            most, best = share, (slower, slow, False)
-    return best
 
 
 def _climb(clip: Clip) -> str:

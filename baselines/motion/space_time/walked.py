@@ -32,10 +32,12 @@ from .own_steps import (
     MOST_TURN,
     QUICKEST,
     TOGETHER,
+    OwnSteps,
     check_changes,
     out_of_turn,
     own_steps,
 )
+from .turns import spread_rates
 from .walk_limits import limits_of_walk
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
@@ -50,6 +52,7 @@ LEARNED_BANK = 0.0875  # [g] of speed times turning rate, above which robots fal
 ASKED_BANK = 0.091  # [g] commanded in curves at most: it goes slower than commanded
 ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, of the policy's training
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
+FALLS = "the robot falls with its own steps"
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 
 
@@ -86,14 +89,17 @@ def walked_clip(clip: RobotClip, found: Walked, robot: Robot) -> RobotClip:
                            planted=planted), robot)  # fmt: skip
 
 
-def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) -> Walked:
+def find_commands(
+    clip: Clip, robot: Robot, scale: float, least: float = 0.0, *, own: bool = True
+) -> Walked:
     """The velocity along the heading [m/s], the turning rate [rad/s] and the time of a swing [s] of
     a clip, step by step; a time of 0 is that of the walker's gait.
 
     Velocities are means over two steps, times `scale`, the ratio of the legs. Steps last as the
-    clip's where that is possible at `least` of its way times its tempo. Otherwise, where the clip
-    is too fast for legs to follow, all is slower, and where it bends too sharply, steps are shorter
-    and quicker. A run is walked.
+    clip's where that is possible at `least` of its way times its tempo, unless `own` is False.
+    Otherwise, where the clip is too fast for legs to follow, all is slower, and where it bends too
+    sharply, steps are shorter and quicker. What a step turns too far, those around it turn
+    (`spread_rates`). A run is walked.
 
     Raises:
         ConfigError: both feet leave the ground at once, or for 0.6 s; it takes no two steps, goes
@@ -115,6 +121,13 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     left = np.gradient(_mean(_gone(cos * velocity[:, 1] - sin * velocity[:, 0]), size), RATE)
     h, omega = robot.height_com, robot.omega
     speed = np.hypot(ahead, left)
+    each = _steps(lands, period, walk.duration)
+    frames = [_frames(start, end) for start, end, _ in each]
+    rates, going = (np.array([x[these].mean() for these in frames]) for x in (turn, speed))
+    for these, more in zip(
+        frames, spread_rates(each, rates, going, h * omega) - rates, strict=True
+    ):
+        turn[these] += more
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
     fast, steady = robot.name in FAST_ROBOTS, limits_of_walk(robot).speed * h * omega
@@ -139,14 +152,13 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
         raise ConfigError(f"{run}it goes at {speed.max():.2f} m/s, and the planner of walks at "
                           f"{bound:.2f} m/s at most{in_curves}, {tempo:.2f} of it (--speed "
                           f"{tempo:.2f} plays it so)", source=clip.name, field="speed")  # fmt: skip
-    each = _steps(lands, period, walk.duration)
-    rows = np.array([[start, *(rate[_frames(start, end)].mean() for rate in (ahead, left, turn)),
-                      own] for start, end, own in each])  # fmt: skip
-    own = own_steps(rows, robot, least)
-    bound = own.bound or out_of_turn(planted, clip.dt)
-    check_changes(faster(rows, tempo) if own.bound else own.commands, robot, clip.name)
-    if not own.bound:
-        return Walked(own.commands, own.tempo, WALK, 1.0, own.way, stances, bound)
+    rows = np.array([[start, *(rate[these].mean() for rate in (ahead, left, turn)), lasts]
+                     for these, (start, _, lasts) in zip(frames, each, strict=True)])  # fmt: skip
+    found = own_steps(rows, robot, least) if own else OwnSteps(FALLS)
+    bound = found.bound or out_of_turn(planted, clip.dt)
+    check_changes(faster(rows, tempo) if found.bound else found.commands, robot, clip.name)
+    if not found.bound:
+        return Walked(found.commands, found.tempo, WALK, 1.0, found.way, stances, bound)
     commands = faster(rows, tempo)
     if learned:
         commands[:, 4] = 0.0  # it was trained at its gait's own

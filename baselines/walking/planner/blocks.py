@@ -62,6 +62,7 @@ class Gait(Block):
     calm_time: float  # on both feet, after which it goes on [s]
     command: np.ndarray  # (8,) see `GaitCommand.array`; those that follow are its entries
     commanded_step_time: Mutable[float]  # [s]; 0 here and below: the gait's own
+    asked_step_time: Mutable[float]  # [s] the same, of this step
     commanded_width: Mutable[float]  # [m]
     commanded_clearance: Mutable[float]  # [m]
     commanded_arm_swing: Mutable[float]  # [rad]

@@ -41,7 +41,7 @@ LEAST_TIME = 0.06  # [s] for which the CoP on one foot is planned at least
 @compiled
 def step_time(g: Gait) -> float:
     """T [s]: as commanded, or the gait's own; no shorter than the legs can."""
-    wanted = g.commanded_step_time if g.commanded_step_time > 0.0 else g.step_time
+    wanted = g.asked_step_time if g.asked_step_time > 0.0 else g.step_time
     if g.commanded_step_length > 0.0:
         speed = np.sqrt(g.command[0] * g.command[0] + g.command[1] * g.command[1])
         period = g.commanded_step_length / max(speed, 1e-9)

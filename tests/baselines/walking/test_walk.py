@@ -138,6 +138,27 @@ def test_step_time_and_width_are_commanded():
     assert env.controller._swing.duration == pytest.approx(gait.step_time, abs=0.05)
 
 
+@pytest.mark.parametrize("share, lasts", [(0.2, 0.75), (0.6, 0.5)])
+def test_a_step_time_that_comes_late_in_a_swing_is_that_of_the_next_step(share, lasts):
+    """A robot that is a little late would otherwise take each step of a clip as long as the next."""
+    _, _, env = walk((4.0, GaitCommand(0.2, step_time=0.5)), seed=4)
+    swing, action = env.controller._swing, np.zeros(len(env.action_names))
+    memory = env.controller.memory
+
+    def until(reached):
+        while not reached():
+            env.step(action)
+
+    until(lambda: not memory.swinging)
+    until(lambda: memory.swinging and swing.time > share * swing.duration)
+    env.controller.command = GaitCommand(0.2, step_time=0.75)
+    until(lambda: swing.time > swing.duration - 0.05)
+    assert swing.duration == pytest.approx(lasts, abs=0.06)
+    until(lambda: not memory.swinging)
+    until(lambda: memory.swinging and swing.time > swing.duration - 0.05)
+    assert swing.duration == pytest.approx(0.75, abs=0.06)
+
+
 def test_a_step_time_of_a_command_is_above_zero():
     with pytest.raises(ConfigError, match=r"command\.step_time.*above 0"):
         GaitCommand(0.1, step_time=0.0)
