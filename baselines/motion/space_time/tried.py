@@ -12,7 +12,15 @@ from poise.baselines.motion.retargeting.retarget import ENOUGH, Holds, Rehearsed
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .walked import LEARNED, Walked, find_commands, walked_clip
+from .walked import (
+    FAST_ROBOTS,
+    LEARNED,
+    WALK,
+    WALK_FAST,
+    Walked,
+    find_commands,
+    walked_clip,
+)
 
 SLOWER = (1.0, 0.9, 0.8)  # times its speed, at which a walk is tried
 KEPT, LEAST = 0.9, 0.75  # of a clip's own steps: enough; less, and they are others
@@ -48,14 +56,16 @@ def held_walk(
 
 
 def _ways(free: Retargeted, found: Walked, robot: Robot) -> Iterator[tuple[RobotClip, Walked]]:
-    """A walk as it is found and slower, with its arms and, where it has not learned with free ones,
-    without."""
+    """A walk as it is found and slower, a clip's own steps by a planner for fast walks, too; with
+    its arms and, where it has not learned with free ones, without."""
     walk = walked_clip(free.clip, found, robot)
+    fast = found.walker == WALK and not found.bound and robot.name in FAST_ROBOTS
     for arms in (False,) if found.walker == LEARNED else (False, True):
-        for pace in SLOWER:
-            if found.way * found.tempo * pace >= ENOUGH:
-                yield (
-                    replace(walk, about=replace(walk.about, free_arms=arms), dt=walk.dt / pace,
-                            commands=faster(walk.commands, pace)),
-                    found._replace(tempo=pace * found.tempo),
-                )  # fmt: skip
+        for walker in (WALK, WALK_FAST) if fast else (found.walker,):
+            for pace in SLOWER:
+                if found.way * found.tempo * pace >= ENOUGH:
+                    yield (
+                        replace(walk, about=replace(walk.about, free_arms=arms), dt=walk.dt / pace,
+                                commands=faster(walk.commands, pace)),
+                        found._replace(tempo=pace * found.tempo, walker=walker),
+                    )  # fmt: skip
