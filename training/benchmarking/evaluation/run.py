@@ -39,6 +39,7 @@ from poise.training.benchmarking.trials.agents import (
     can_walk,
     check_may_walk,
     check_walks,
+    can_follow,
     follows_no_motion,
     stand_in,
 )
@@ -127,7 +128,7 @@ class Run:
         for name, agent in self.agents.items():
             if self.suite.walks:
                 check_walks(name, agent, f"suite {suite}")
-            if self.suite.motions is not None and not isinstance(agent.env, ResidualBalanceEnv):
+            if self.suite.motions is not None and not can_follow(agent):
                 raise follows_no_motion(name, f"suite {suite}")
         self.settings = Settings(
             **known,
