@@ -16,6 +16,7 @@ from poise.baselines.controller import Controller, Targets, as_base_controller
 from poise.baselines.registry import (
     ControllerConfig,
     is_replaced,
+    kind_of,
     load_controller,
     performing_controllers,
     where_uncertain,
@@ -170,7 +171,7 @@ class ResidualBalanceEnv(ControlledEnv):
         elif self._reference.footing is not None:
             raise ConfigError(
                 f"the feet of {self._reference.name!r} leave the ground, which "
-                f"{type(decides).__name__} cannot perform", source="environment", field="motion",
+                f"{kind_of(decides)} cannot perform", source="environment", field="motion",
                 choices=performing_controllers(),
             )  # fmt: skip
 
