@@ -15,7 +15,6 @@ from typing import Any
 from rich.console import Console
 
 from poise.baselines.allowance import allowing
-from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
@@ -36,10 +35,10 @@ from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import (
     Agent,
+    can_follow,
     can_walk,
     check_may_walk,
     check_walks,
-    can_follow,
     follows_no_motion,
     stand_in,
 )

@@ -121,13 +121,20 @@ def test_steps_are_joined_and_put_together(
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
         (["follow", "squat ->"], 'script: line 1, column 9: after "->" a motion is missing'),
         (["follow", "stand -> jump"], "script: line 1, column 10: no motion 'jump' (choices:"),
-        (["follow", "other.bvh", "--robot", "compact"],
-         "other.bvh: motion: is motion capture: import it first, by poise motion import other.bvh "
-         "--robot compact --out FILE.npz"),
+        (
+            ["follow", "other.bvh", "--robot", "compact"],
+            "other.bvh: motion: is motion capture: import it first, by poise motion import "
+            "other.bvh --robot compact --out FILE.npz",
+        ),
         (["check", "other.bvh"], "other.bvh: motion: is motion capture: import it first"),
-        (["follow", "squat", "--robot", "compact", "--share", "0.5"],
-         "share: no J50 of 'compact' was measured: give --push N [N·s] instead (choices: humanoid"),
-        (["follow", "kick"], "motion: the feet of 'kick' leave the ground, which momentum-qp cannot"),
+        (
+            ["follow", "squat", "--robot", "compact", "--share", "0.5"],
+            "share: no J50 of 'compact' was measured: give --push N [N·s] instead (choices: ",
+        ),
+        (
+            ["follow", "kick"],
+            "motion: the feet of 'kick' leave the ground, which momentum-qp cannot",
+        ),
         (["check", "kick", "--qp"], "kick: qp: is not for motions with steps"),
         (
             ["import", "humanoid_stand", "--out", "x.npz", "--constraints", "nothing"],
