@@ -176,7 +176,7 @@ def follow(
         if script is not None:
             from poise.training.motion.following.scripts import open_synthesis, write_motion
 
-            synthesis = open_synthesis(None, robot, script=script)
+            synthesis = open_synthesis(None, robot, script=script, console=terminal(True))
             folder = stack.enter_context(TemporaryDirectory(prefix="poise-"))
             motion = str(Path(folder) / f"{Path(script.source).stem}.npz")
             write_motion(synthesis, script, robot, Path(motion))
@@ -193,7 +193,8 @@ def follow(
         watched = Watched() if report is not None else None
         film = None if video is None else stack.enter_context(MotionFilm(video, size, watched))
         count = 20 if starts is None else starts
-        watch = stack.enter_context(FollowProgress(count, terminal(stderr=True), film or watched))
+        shown = FollowProgress(count, terminal(stderr=True), film or watched, film is not None)
+        watch = stack.enter_context(shown)
         if tracker is not None:
             body = load_robot(robot)
             half = load_limits(body).j50() if share else None
