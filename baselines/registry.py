@@ -133,6 +133,12 @@ def walking_controllers(*, planners: bool = False) -> list[str]:
     return _packaged("walk") if planners else _packaged("walk", "simbicon")
 
 
+def controller_kind(controller: object) -> str:
+    """Return the kind of a controller, or the name of its class if it is of no kind here."""
+    known = (kind for kind, (_, made) in KINDS.items() if type(controller) is made)
+    return next(known, type(controller).__name__)
+
+
 def performing_controllers() -> list[str]:
     """The packaged controllers that perform motions whose feet leave the ground."""
     return _packaged(MOTION_STEP)

@@ -15,6 +15,7 @@ from poise.baselines.balance.references.tempo import Pace, Tempo
 from poise.baselines.controller import Controller, Targets, as_base_controller
 from poise.baselines.registry import (
     ControllerConfig,
+    controller_kind,
     is_replaced,
     load_controller,
     performing_controllers,
@@ -170,7 +171,7 @@ class ResidualBalanceEnv(ControlledEnv):
         elif self._reference.footing is not None:
             raise ConfigError(
                 f"the feet of {self._reference.name!r} leave the ground, which "
-                f"{type(decides).__name__} cannot perform", source="environment", field="motion",
+                f"{controller_kind(decides)} cannot perform", source="environment", field="motion",
                 choices=performing_controllers(),
             )  # fmt: skip
 

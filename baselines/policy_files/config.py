@@ -189,7 +189,7 @@ class PolicyFileConfig:
             is not said here; relative to the YAML file.
         joints: names in the policy's order; empty: `motors` tells.
         motors: numbers of the robot's joints, in the policy's order, where there are no names;
-            empty: as many of the robot's first joints as the policy has actions.
+            empty: as many of the robot's first joints as a list here has numbers, else all.
         default: posture that joint positions are relative to [rad].
         stiffness: K [N·m/rad].
         damping: D [N·m·s/rad].

@@ -158,18 +158,22 @@ class PolicyFile(CompiledController):
 
     def _check_sizes(self) -> None:
         """Ask the network once, with zeros."""
-        name, source = Path(self.config.policy).name, self.config.described_in
+        config, robot = self.config, self.robot
+        name, source, said = Path(config.policy).name, config.described_in, ""
+        if not (config.joints or config.motors):
+            said = (f"; without joints or motors they are the first {len(self.joints.index)} of "
+                    f"{robot.name!r}")  # fmt: skip
         try:
             answer = self.network.act(
                 {n: np.zeros(size) for n, size in self.observer.sizes.items()}
             )
         except Exception as error:  # of onnxruntime or torch
-            raise ConfigError(f"{name} does not take {self.observer}: {error}", source=source,
+            raise ConfigError(f"{name} does not take {self.observer}: {error}{said}", source=source,
                               field="observations") from None  # fmt: skip
         for role, values in answer.items():
             if len(values) != len(self.action):
                 what = f"{len(values)} {'actions' if role == 'action' else role}"
-                raise ConfigError(f"{name} gives {what} for {len(self.action)} joints",
+                raise ConfigError(f"{name} gives {what} for {len(self.action)} joints{said}",
                                   source=source, field="joints")  # fmt: skip
         self.network.reset()
 

@@ -141,20 +141,17 @@ def _index(robot: Robot, config: PolicyFileConfig) -> np.ndarray:
             raise _wrong(config, "joints", f"{robot.name!r} lacks {', '.join(lost)}", names)
         found = [names.index(name) for name in config.joints]
     else:
-        found = list(config.motors or range(_count(config)))
+        found = list(config.motors or range(_count(config) or len(names)))
         if max(found, default=0) >= len(names):
             raise _wrong(config, "motors", f"number {max(found)} of the policy's is beyond the "
                          f"{len(names)} joints of {robot.name!r}")  # fmt: skip
-    if not found:
-        raise _wrong(config, "joints", "is not given: the joints' names in the policy's order, or "
-                     "their numbers (motors)", names)  # fmt: skip
     if len(set(found)) < len(found):
         raise _wrong(config, "joints" if config.joints else "motors", "must be different")
     return np.array(found, dtype=np.int64)
 
 
 def _count(config: PolicyFileConfig) -> int:
-    """Joints of a policy that names none."""
+    """Joints of a policy that names none: as many as a list has numbers; 0 without a list."""
     lists = (config.default, config.stiffness, config.damping, config.action_scale)
     return max(len(values) for values in (*lists, ()) if isinstance(values, tuple))
 

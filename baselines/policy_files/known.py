@@ -84,8 +84,8 @@ def expect_network(origin: Origin, name: str) -> Path:
     if found.others:
         hint = (f"{found.others[0]} has another checksum than the known one, and runs only when "
                 f"you give its path (base: {name}, policy: PATH in a .yaml file); ")  # fmt: skip
-    raise ConfigError(f"the network of {name} is not here: {hint}get it by: {how_to_get(origin)}",
-                      source=name, field="policy")  # fmt: skip
+    raise ConfigError(f"the network of {name} is not here, nor in a folder of {PLACES}: {hint}get "
+                      f"it by: {how_to_get(origin)}", source=name, field="policy")  # fmt: skip
 
 
 def how_to_get(origin: Origin) -> str:

@@ -136,6 +136,9 @@ class OnnxNetwork:
         try:
             given = {self._inputs[place].name: _given(self._inputs[place], values)
                      for place, values in observations.items()}  # fmt: skip
+        except ValueError as error:
+            raise PoiseError(str(error)) from None
+        try:
             with self._clocked.run() as options:
                 found = self._session.run(wanted, {**given, **self._memory}, options)
             answer = {role: np.asarray(values, dtype=float).ravel()

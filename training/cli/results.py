@@ -104,7 +104,8 @@ def replay(
     for done in replays:
         _print_replay(done)
     if video is not None:
-        film(folder, trial, [done.controller for done in replays], video, allow=allow)
+        film(folder, trial, [done.controller for done in replays], video, allow=allow,
+             console=terminal(stderr=True))  # fmt: skip
     for path in (video, plot):
         if path is not None:
             print(path)

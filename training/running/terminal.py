@@ -4,7 +4,8 @@ import codecs
 import sys
 import time
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +122,21 @@ def steps_bar(label: str, console: Console | None = None) -> ProgressLines:
 def trials_bar(console: Console) -> Progress:
     """Return a bar, or lines, with trials, time left and what a trial is at (field `rate`)."""
     return _bar("trials", MofNCompleteColumn(), "{task.fields[rate]}", console)
+
+
+def clips_bar(console: Console | None = None) -> Progress:
+    """Return a bar, or lines, with clips and the one that is made (field `rate`); None: neither."""
+    console = console or Console(quiet=True)
+    return _bar("clips", MofNCompleteColumn(), "{task.fields[rate]}", console)
+
+
+@contextmanager
+def filming(seconds: float, console: Console | None = None) -> Iterator[Callable[[float], None]]:
+    """Show a bar, or lines, of `seconds` that are filmed; yields what takes the time [s]."""
+    count = TextColumn("{task.completed:.0f}/{task.total:.0f} s")
+    with _bar("filming", count, "", console or Console(quiet=True)) as bar:
+        task = bar.add_task("", total=seconds)
+        yield lambda time: bar.update(task, completed=min(time, seconds))
 
 
 def _bar(label: str, count: ProgressColumn, rates: str, console: Console | None) -> ProgressLines:

@@ -199,11 +199,11 @@ def reference_from(
 
 def check_clip_robot(clip: RobotClip, robot: Robot, source: str) -> None:
     """Raise ConfigError unless the postures are of this robot."""
+    its, other = clip.about.robot, robot.name
     if clip.about.fingerprint != robot.fingerprint:
-        raise ConfigError(
-            f"is a motion of the robot {clip.about.robot!r}, not of {robot.name!r} as it is here",
-            source=source, field="motion",
-        )  # fmt: skip
+        hint = f" (--robot {its})" if its != other else " as it is here"
+        raise ConfigError(f"is a motion of the robot {its!r}, not of {other!r}{hint}",
+                          source=source, field="motion")  # fmt: skip
 
 
 def stepped_reference(

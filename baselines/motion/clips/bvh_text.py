@@ -55,13 +55,14 @@ def read_bvh_text(path: Path) -> BvhText:
     64 MiB, 500 joints, 100 levels, 20 million values; all numbers finite; one root; as many rows of
     as many values as are announced.
     """
-    lines = enumerate(_text(path).splitlines(), start=1)
-    head = _Head(path)
+    whole = _text(path).splitlines()
+    lines, head = enumerate(whole, start=1), _Head(path)
     for number, line in lines:
         if any(head.take(number, words) for words in _statements(line)):
             break
     else:
-        raise ConfigError("ends before a line 'Frame Time:'", source=path)
+        raise ConfigError(f"line {len(whole)}: the file ends before a line 'Frame Time:'",
+                          source=path)  # fmt: skip
     values = _rows(lines, head)
     return BvhText(
         tuple(head.names), np.array(head.parents), np.array(head.offsets),

@@ -13,6 +13,7 @@ from poise.baselines.balance.references.motion import load_steps, motions_with_s
 from poise.baselines.balance.references.robot_clip import (
     About,
     RobotClip,
+    check_clip_robot,
     read_robot_clip,
     reference_from,
 )
@@ -120,9 +121,7 @@ def _file(name: str | Path) -> Path:
 
 def _stored(path: Path, robot: Robot) -> RobotClip:
     stored = read_robot_clip(path)
-    if stored.about.fingerprint != robot.fingerprint:
-        raise ConfigError(f"is a motion of the robot {stored.about.robot!r}, not of "
-                          f"{robot.name!r}", source=path, field="robot")  # fmt: skip
+    check_clip_robot(stored, robot, str(path))
     jumps = stored.planted is not None and not stored.planted.any(axis=1).all()
     if stored.free or jumps:
         raise ConfigError("jumps, or is walked by a planner: it cannot be joined", source=path,

@@ -1,6 +1,6 @@
 """A script's actions, in order: brackets and names of its own resolved, overlays made."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
 from poise.baselines.motion.clips.clip import Clip
@@ -14,10 +14,11 @@ from poise.baselines.motion.synthesis.scripts.tree import (
     ScriptTerm,
     Sequence,
     StateName,
+    bodies,
 )
-from poise.configs.errors import shown
+from poise.configs.errors import ConfigError, meant, shown
 
-from .stage import Stage, changed, layer_of, overlaid_clip
+from .stage import Stage, changed, layer_of, overlaid_clip, whole_name
 
 MOST_ACTIONS = 1000
 OVER = ("on", "weight")
@@ -164,10 +165,25 @@ class Reader:
     def _found(self, body: ClipName) -> str:
         name = self.stage.find(body.name)
         if name is None:
-            names = [*(define.name for define in self.script.defines), *self.stage.packed,
-                     *self.stage.others]  # fmt: skip
-            raise self.script.wrong(f"no motion {shown(body.name)}", body.at, names)
+            raise _no_motion(self.script, body, [*self.stage.packed, *self.stage.others])
         return name
+
+
+def check_clips(script: Script, names: Collection[str], others: Iterable[str] = ()) -> None:
+    """Raise ConfigError as `Reader.actions` for a clip that is none of `names`, before these are
+    loaded: to retarget them takes a minute. `others` are choices, too."""
+    defined = {define.clip for define in script.defines}
+    for body in bodies(script):
+        named = not isinstance(body, ClipName) or body in defined
+        if not named and whole_name(body.name, names) is None:
+            raise _no_motion(script, body, [*names, *others])
+
+
+def _no_motion(script: Script, body: ClipName | StateName, names: list[str]) -> ConfigError:
+    choices = [*(define.name for define in script.defines), *names]
+    short = [name.partition("_")[2] for name in names if "_" in name]  # which will do
+    hint = meant(body.name, [name for name in (*short, *choices) if name != body.name])
+    return script.wrong(f"no motion {shown(body.name)}{hint}", body.at, choices)
 
 
 def state_of(overlay: Overlay) -> StateName | None:

@@ -1,6 +1,6 @@
 """The clips that a script plays: those of a graph, and those that it makes of them on the way."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -48,11 +48,8 @@ class Stage:
         return frames_of(clip, planted=True if self.graph.robot else None)._replace(name=name)
 
     def find(self, name: str) -> str | None:
-        """The clip of a name, or the only one that ends in `_name`; None if there is none."""
-        if name in self.packed:
-            return name
-        ends = [full for full in self.packed if full.endswith(f"_{name}")]
-        return ends[0] if len(ends) == 1 else None
+        """The clip of a name, see `whole_name`; None if there is none."""
+        return whole_name(name, self.packed)
 
     def add(self, text: str, clip: Clip) -> None:
         """Make a derived clip a node of the graph."""
@@ -108,6 +105,14 @@ class Stage:
         frames = frames_of(pair, pair.dt)
         index = -1 if frame else 0
         return frames.heights[index], frames.rotations[index]
+
+
+def whole_name(name: str, names: Collection[str]) -> str | None:
+    """Return the one of `names`, or the only one of them that ends in `_name`; None without one."""
+    if name in names:
+        return name
+    ends = [full for full in names if full.endswith(f"_{name}")]
+    return ends[0] if len(ends) == 1 else None
 
 
 def changed(clip: Clip, modifier: Modifier, script: Script) -> Clip:

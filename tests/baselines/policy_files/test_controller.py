@@ -23,6 +23,8 @@ from tests.support.shared import robot as shared_robot
 
 STEPS, SUBSTEPS = 200, 10
 SHAKY = {"push": [], "noise": 1.0}
+#: of all joints, so that no list says how many there are
+ONE_NUMBER = {"default": 0.1, "stiffness": 40.0, "damping": 1.0, "action_scale": 0.1}
 
 
 @pytest.fixture(scope="module")
@@ -306,8 +308,7 @@ def test_a_simulation_that_diverged_is_a_fall(robot: Robot, own: Path) -> None:
     ("changes", "parts"),
     [
         ({"observations": [{"term": "base_ang_vel"}]},
-         ("observations: policy.onnx does not take 3 numbers (base_ang_vel 3)",
-          "it takes 1 × 112")),
+         ("observations: policy.onnx does not take 3 numbers (base_ang_vel 3): it takes 1 × 112",)),
         ({"observations": [{"term": "joint_torques"}]},
          ("observations[0].term: no such term: 'joint_torques'", "projected_gravity", "dof_pos")),
         ({"observations": [{"term": "phase", "scale": [1.0, 1.0, 1.0]}]},
@@ -315,8 +316,8 @@ def test_a_simulation_that_diverged_is_a_fall(robot: Robot, own: Path) -> None:
         ({"joints": ["left_knee", "tail"]}, ("joints: 'compact' lacks tail", "choices")),
         ({"joints": [], "motors": [3, 400]}, ("motors: number 400", "'compact'")),
         ({"joints": [], "motors": [3, 3]}, ("motors: must be different",)),
-        ({"joints": [], "default": 0.1, "stiffness": 40.0, "damping": 1.0, "action_scale": 0.1},
-         ("joints: is not given", "left_knee")),
+        ({"joints": [], **ONE_NUMBER},
+         ("does not take", "without joints or motors they are the first 25 of 'compact'")),
         ({"default": [0.1, 0.2]}, ("default: has 2 numbers for 23 joints",)),
         ({"default": {"*_knee*": 17.0, "*": 0.0}}, ("default: 17 rad is far outside of the",)),
         ({"action_scale": 1e300}, ("action_scale: must be at most 1000",)),
@@ -345,6 +346,16 @@ def test_what_does_not_add_up(
     text = str(error.value)
     assert all(part in text for part in parts) and "\n" not in text
     assert text.startswith(str(path))
+
+
+def test_joints_that_are_not_given_are_all_of_the_robot(robot: Robot, own: Path) -> None:
+    """In its order, where no list says how many; as many as the network has actions."""
+    n = len(robot.joint_names)
+    write_onnx(own.with_name("all.onnx"), linear(n, n))
+    fields = {**described(robot), **ONE_NUMBER, "observations": [{"term": "actions"}]}
+    fields |= {"policy": "all.onnx", "joints": []}
+    controller = load_controller(str(write_yaml(own.with_name("all.yaml"), **fields)), robot)
+    np.testing.assert_array_equal(controller.joints.index, np.arange(n))
 
 
 def test_a_policy_of_fewer_actions_than_joints(robot: Robot, own: Path) -> None:

@@ -197,7 +197,9 @@ def test_a_known_network_is_found_by_its_sum(
     (there / "deep/renamed.onnx").unlink()
     with pytest.raises(ConfigError, match="git clone https://github.com/them/theirs") as error:
         read(path)
-    assert "own: policy: the network of own is not here" in str(error.value)
+    assert "own: policy: the network of own is not here, nor in a folder of POISE_POLICIES" in str(
+        error.value
+    )
     other = write_onnx(there / "policy.onnx", linear(3, 2, seed=1))
     with pytest.raises(ConfigError, match=f"{other} has another checksum than the known one"):
         read(path)

@@ -51,6 +51,21 @@ def test_a_quiet_console_shows_no_progress() -> None:
         assert ("trials" in text.getvalue()) == is_terminal
 
 
+def test_filming_and_clips_are_shown_where_there_is_a_console(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The first line comes at once; without a console there is none."""
+    text = io.StringIO()
+    for console in (None, Console(file=text, width=100)):
+        with terminal.filming(8.0, console) as watch:
+            watch(2.0)
+        with terminal.clips_bar(console) as bar:
+            bar.update(bar.add_task("", total=3, rate=""), completed=1, rate="a_wave")
+        assert ("filming 2/8 s" in text.getvalue()) == (console is not None)
+        assert ("a_wave" in text.getvalue()) == (console is not None)
+    assert capsys.readouterr().out == ""
+
+
 def test_a_class_of_one_letter_is_no_emoji(capsys: pytest.CaptureFixture[str]) -> None:
     """Rich would print my.py and a red letter."""
     terminal.terminal().print("my.py:B: 3")

@@ -15,7 +15,6 @@ from typing import Any
 from rich.console import Console
 
 from poise.baselines.allowance import allowing
-from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
@@ -36,6 +35,7 @@ from poise.training.benchmarking.suites.plan import TrialPlan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import (
     Agent,
+    can_follow,
     can_walk,
     check_may_walk,
     check_walks,
@@ -127,7 +127,7 @@ class Run:
         for name, agent in self.agents.items():
             if self.suite.walks:
                 check_walks(name, agent, f"suite {suite}")
-            if self.suite.motions is not None and not isinstance(agent.env, ResidualBalanceEnv):
+            if self.suite.motions is not None and not can_follow(agent):
                 raise follows_no_motion(name, f"suite {suite}")
         self.settings = Settings(
             **known,

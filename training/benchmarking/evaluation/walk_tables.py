@@ -35,10 +35,11 @@ def walk_tables(summary: Summary) -> Iterator[Table]:
     entries = summary["controllers"]
     for name in summary["ranking"]:
         levels = entries[name].get("walks", [])
+        kicked = all(level["part"] == "walk_kick" for level in levels)  # named by their size
         for figures in (FALLS[1:], FOLLOWED, STEPS, COSTS):
             if shown := known(figures, levels):
                 rows = (([level["level"]], level) for level in levels)
-                yield figure_table(name, ["command"], shown, rows)
+                yield figure_table(name, ["kick" if kicked else "command"], shown, rows)
     phases = {name: entries[name].get("phases", []) for name in summary["ranking"]}
     if any(phases.values()):
         middles = sorted({entry["phase"] for found in phases.values() for entry in found})

@@ -5,6 +5,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from rich.console import Console
+
 from poise.baselines.allowance import allowing
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build
@@ -21,6 +23,7 @@ from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.benchmarking.trials.variants import AgentVariants
 from poise.training.pictures.figures.video import SIZE, Episode, record_together, usual
 from poise.training.running.files import SETTINGS
+from poise.training.running.terminal import filming
 
 from .read import Results, load_results
 
@@ -101,6 +104,7 @@ def film(
     fps: float | None = None,
     size: tuple[int, int] | None = None,
     allow: str | Iterable[str] = (),
+    console: Console | None = None,
 ) -> None:
     """Repeat a trial of a result with several controllers and film them side by side.
 
@@ -115,6 +119,7 @@ def film(
         size: width and height of each picture [pixels]; None: as of `record`, but `NARROW` of
             several that are no WebP.
         allow: external controllers (``module:Class``) that may run.
+        console: shows how much is filmed, which takes minutes without a graphics card; None: none.
 
     Raises:
         ConfigError: as `replay`, and for a path or size that is not valid.
@@ -130,7 +135,9 @@ def film(
             again = results.trial(results.record(name, trial))
             episode = _episode(results, name, again, size)
             episodes[name] = stack.enter_context(episode)
-        record_together(episodes, path, fps=fps)
+        seconds = max(episode.base.config.duration for episode in episodes.values())
+        with filming(seconds, console) as watch:
+            record_together(episodes, path, fps=fps, watch=watch)
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import PluginConfig, find_plugin, make_plugin, plugin_config
 from poise.baselines.policy_files.config import PolicyFileConfig
+from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import (
     ControllerConfig,
@@ -152,6 +153,12 @@ def does_not_walk(name: str, source: str) -> ConfigError:
     """Return the error of a controller that does not walk where `source` requires one that does."""
     return ConfigError(f"the controller {shown(name)} does not walk", source=source,
                        field="controller", choices=walking_controllers())  # fmt: skip
+
+
+def can_follow(agent: Agent) -> bool:
+    """Return whether an agent tracks a reference; the network of an external policy sees none."""
+    env = agent.env
+    return isinstance(env, ResidualBalanceEnv) and not isinstance(env.controller, PolicyFile)
 
 
 def follows_no_motion(name: str, source: str | None = None) -> ConfigError:

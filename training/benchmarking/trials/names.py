@@ -1,5 +1,6 @@
 """Checks of names from the user, before any slow import or compilation."""
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,6 +30,12 @@ def check_names(
     """Raise ConfigError, which lists the choices, for an unknown name; see `check_name`."""
     if motion is not None and Path(motion).suffix == ".npz":  # a robot's motion
         motion = None
+    if motion is not None and Path(motion).suffix.lower() == ".bvh" and is_file(motion):
+        raise ConfigError(
+            "is motion capture: import it first, by poise motion import "
+            f"{shlex.quote(motion)} --robot {robot or 'ROBOT'} --out FILE.npz", source=motion,
+            field="motion",
+        )  # fmt: skip
     given = {"robots": robot, "suites": suite, "motions": motion, "physics": physics}
     for kind, name in given.items():
         if name is not None:

@@ -12,7 +12,7 @@ import tyro
 from poise.baselines.allowance import named
 from poise.baselines.motion.synthesis.scripts.library import find_script, names_script
 from poise.configs.errors import ConfigError
-from poise.configs.files import write_atomic
+from poise.configs.files import packaged, write_atomic
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
 from poise.training.running.options.arguments import Allow, OnRobot, Switch
@@ -51,8 +51,10 @@ def check(
     from poise.baselines.motion.feasibility.fit import fit_motion
     from poise.baselines.motion.feasibility.gap import with_gap
     from poise.baselines.registry import momentum_qp_config
+    from poise.training.benchmarking.trials.names import check_names
     from poise.training.motion.following.tables import print_feasibility
 
+    check_names(robot=robot, motion=motion)
     if (out is None) == fit:
         raise ConfigError("--fit and --out go together", field="out")
     body, console = load_robot(robot), terminal()
@@ -139,6 +141,9 @@ def follow(
     is_clip = Path(motion).suffix in (".npz", ".csv") or motion == "network"
     check_names([controller], robot=robot, motion=None if script or is_clip else motion,
                 physics=physics)  # fmt: skip
+    if share and not push and robot in packaged("robots") and robot not in packaged("limits"):
+        raise ConfigError(f"no J50 of {robot!r} was measured: give --push N [N·s] instead",
+                          field="share", choices=packaged("limits"))  # fmt: skip
     from poise.baselines.balance.references.tempo import Tempo
     from poise.training.benchmarking.trials.push_limits import load_limits
     from poise.training.motion.following.fastest import STARTS, find_fastest
@@ -167,14 +172,14 @@ def follow(
     pushed = f"pushed by {share:g} of J50" if share else pushed
     faster = f", {tempo:g} times as fast" if tempo != 1.0 else ""
     with allowing([*named(controller), *allow]), ExitStack() as stack:
+        tracker = tracker_config(controller)  # before a script is made
         if script is not None:
             from poise.training.motion.following.scripts import open_synthesis, write_motion
 
-            synthesis = open_synthesis(None, robot, script=script)
+            synthesis = open_synthesis(None, robot, script=script, console=terminal(True))
             folder = stack.enter_context(TemporaryDirectory(prefix="poise-"))
             motion = str(Path(folder) / f"{Path(script.source).stem}.npz")
             write_motion(synthesis, script, robot, Path(motion))
-        tracker = tracker_config(controller)
         if tracker is not None:
             if fastest or waits or tempo != 1.0 or report:
                 raise ConfigError("a tracker follows its clip at the clip's own pace: not with "
@@ -188,7 +193,8 @@ def follow(
         watched = Watched() if report is not None else None
         film = None if video is None else stack.enter_context(MotionFilm(video, size, watched))
         count = 20 if starts is None else starts
-        watch = stack.enter_context(FollowProgress(count, terminal(stderr=True), film or watched))
+        shown = FollowProgress(count, terminal(stderr=True), film or watched, film is not None)
+        watch = stack.enter_context(shown)
         if tracker is not None:
             body = load_robot(robot)
             half = load_limits(body).j50() if share else None

@@ -307,11 +307,9 @@ def _clip(file: Path, unit: str, up: str, forward: str, robot: str, joints: Sequ
     """Return the clip of a BVH file, or of a robot's .npz."""
     if file.suffix != ".npz":
         return read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
-    from poise.baselines.balance.references.robot_clip import read_robot_clip
+    from poise.baselines.balance.references.robot_clip import check_clip_robot, read_robot_clip
     from poise.baselines.motion.retargeting.robot_bvh import clip_of_robot
 
     stored, body = read_robot_clip(file), load_robot(robot)
-    if stored.about.fingerprint != body.fingerprint:
-        raise ConfigError(f"is a motion of the robot {stored.about.robot!r}, not of {body.name!r}",
-                          source=file, field="robot")  # fmt: skip
+    check_clip_robot(stored, body, str(file))
     return clip_of_robot(body, stored.qpos, stored.dt, file.stem)

@@ -1,5 +1,6 @@
 """`poise motion graph`, `plan` and `synth`: which clip may follow which, and a script performed."""
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
@@ -70,7 +71,7 @@ def graph(
         "coefficient": coefficient, "angle": angle, "contacts": not any_feet, "least": least,
         "most": most, "time_price": time_price, "each": each}, "graph")  # fmt: skip
     body = None if robot is None else load_robot(robot)
-    loaded = load_clips([str(file) for file in files], body)
+    loaded = load_clips([str(file) for file in files], body, console=terminal(stderr=True))
     made = make_graph(loaded, limits, _weights(weights), _states(state), robot or "")
     write_graph(made, out)
     print_graph(made, terminal())
@@ -110,7 +111,7 @@ def plan(
     from poise.training.motion.following.script_tables import print_plan
 
     tree = find_script(script)
-    synthesis = open_synthesis(graph, robot, kind, script=tree)
+    synthesis = open_synthesis(graph, robot, kind, script=tree, console=terminal(stderr=True))
     print_plan(synthesis.plan(tree, k), sequence_text(tree.sequence), terminal())
     if table:
         print(to_csv(tree), end="")
@@ -148,10 +149,11 @@ def synth(
                           source=out, field="out")  # fmt: skip
     if report is not None:
         check_page(report)
+    begin = time.monotonic()
     tree = between(find_script(script), start, goal)
-    synthesis = open_synthesis(graph, robot, kind, least, tree)
+    synthesis = open_synthesis(graph, robot, kind, least, tree, terminal(stderr=True))
     record = write_motion(synthesis, tree, robot, out)
-    print(f"{record['duration']:.1f} s, made in {record['seconds']:.1f} s")
+    print(f"{record['duration']:.1f} s, made in {time.monotonic() - begin:.1f} s")
     print(out)
     if report is not None:
         write_synthesis(report, record, out, robot)

@@ -7,14 +7,16 @@ from pathlib import Path
 from poise.baselines.allowance import is_script
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.policy_files.known import known_policies
+from poise.baselines.policy_files.known import RIVALS, known_policies
 from poise.baselines.policy_files.networks import onnx_session
 from poise.baselines.policy_files.observations import tracks_motion
 from poise.baselines.policy_files.onnx.files import BYTES, digest, is_network
 from poise.baselines.policy_files.onnx.metadata import metadata_fields
+from poise.baselines.policy_files.refused import check_not_refused
 from poise.baselines.registry import controller_config
-from poise.configs.errors import ConfigError
-from poise.configs.reading import is_file, read_bytes
+from poise.configs.errors import ConfigError, meant, shown
+from poise.configs.files import packaged
+from poise.configs.reading import is_file, is_folder, read_bytes
 from poise.envs.robots.robot import Robot
 
 from .guess import WORDS, Layout, Sizes, layouts, network_sizes
@@ -81,6 +83,7 @@ def check_policy(
     Raises ConfigError, which names the field, for a file that is no policy or a wrong description.
     """
     path = Path(file)
+    _check_given(file)
     bare = is_file(path) and (is_script(path) or is_network(path))
     known = known_as(path) if bare else None
     said = _said(path) if bare else {}
@@ -113,6 +116,18 @@ def check_policy(
         proposed = _better(tried, stood)
     return PolicyCheck(file, known, sizes, (), _unsaid(config), stood, tuple(findings),
                        tuple(tried), proposed, steps > 1, _holds(config))  # fmt: skip
+
+
+def _check_given(file: str) -> None:
+    """Raise ConfigError, which lists the known policies, for neither a file nor a name of one."""
+    names = packaged(RIVALS)
+    if file in (*names, *packaged("controllers")) or is_file(file) or is_folder(file):
+        return
+    check_not_refused(file)
+    hint = meant(file, names) or ";"
+    raise ConfigError(f"no such policy: {shown(file)}{hint} give a network (.onnx, .pt), a .yaml "
+                      "file, a folder, or a known name", field="policy",
+                      choices=names)  # fmt: skip
 
 
 def _holds(config: PolicyFileConfig) -> bool:

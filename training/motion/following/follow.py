@@ -22,7 +22,12 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
-from poise.training.benchmarking.trials.agents import Agent, follows_no_motion, load_agent
+from poise.training.benchmarking.trials.agents import (
+    Agent,
+    can_follow,
+    follows_no_motion,
+    load_agent,
+)
 from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
 from poise.training.benchmarking.trials.play import Watch, run_trial
 from poise.training.benchmarking.trials.push_limits import load_limits
@@ -198,9 +203,12 @@ def performer(
     given |= {} if realism is None else {"realism": load_realism(realism)}
     given |= {} if physics is None else {"physics": load_physics(physics)}
     try:
-        return load_agent(controller, robot, **given)
+        agent = load_agent(controller, robot, **given)
     except TypeError:
         raise follows_no_motion(controller) from None
+    if not can_follow(agent):
+        raise follows_no_motion(controller)
+    return agent
 
 
 def fall_limits(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:

@@ -22,14 +22,15 @@ class FollowProgress(ExitStack):
         starts: number of trials.
         console: where it is shown.
         others: another watch that is also called for every trial.
+        filmed: whether that films the first trial, which takes longer than the others.
     """
 
     def __init__(
         self, starts: int, console: Console,
-        others: Callable[[Trial], Watch | None] | None = None,
+        others: Callable[[Trial], Watch | None] | None = None, filmed: bool = False,
     ):  # fmt: skip
         super().__init__()
-        self.starts, self.others = starts, others
+        self.starts, self.others, self.filmed = starts, others, filmed
         self._bar = trials_bar(console)
         self._task: TaskID | None = None  # none until the first trial: what fails before is alone
 
@@ -44,7 +45,7 @@ class FollowProgress(ExitStack):
             self.enter_context(self._bar)
             self._task = self._bar.add_task("", total=self.starts, rate="")
         task, more = self._task, None if self.others is None else self.others(trial)
-        shown = -EVERY
+        shown, filmed = -EVERY, ", filmed" if self.filmed and trial.number == 0 else ""
 
         def watch(env: BalanceEnv) -> None:
             nonlocal shown
@@ -53,7 +54,7 @@ class FollowProgress(ExitStack):
             time = env.simulation.time
             if time >= shown + EVERY:
                 shown = time
-                rate = f"trial {trial.number + 1}: {time:.0f} s"
+                rate = f"trial {trial.number + 1}{filmed}: {time:.0f} s"
                 self._bar.update(task, completed=trial.number, rate=rate)
 
         return watch

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+
 from poise.baselines.balance.references.motion import motions_with_steps
 from poise.baselines.balance.references.robot_clip import write_robot_clip
 from poise.baselines.motion.clips.bvh import write_bvh
@@ -15,6 +17,7 @@ from poise.baselines.motion.graphs.adjacency import make_graph
 from poise.baselines.motion.graphs.motion_graph import GraphClip, Thresholds, read_graph
 from poise.baselines.motion.retargeting.performed import load_clip, robot_clip_of
 from poise.baselines.motion.retargeting.robot_bvh import clip_of_robot
+from poise.baselines.motion.synthesis.actions import check_clips
 from poise.baselines.motion.synthesis.plan import PHYSICAL
 from poise.baselines.motion.synthesis.robot_joins import RobotJoins
 from poise.baselines.motion.synthesis.scripts.tree import Script, clip_names
@@ -24,6 +27,7 @@ from poise.configs.files import write_atomic
 from poise.configs.reading import is_file
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot, load_robot
+from poise.training.running.terminal import clips_bar
 
 CLIP_FILES = (".bvh", ".npz", ".yaml")  # that a script may name in quotes
 
@@ -34,6 +38,7 @@ def open_synthesis(
     kind: str | None = None,
     least: float | None = None,
     script: Script | None = None,
+    console: Console | None = None,
 ) -> Synthesis:
     """Return the clips of a graph, or the packaged ones, ready for scripts.
 
@@ -47,10 +52,12 @@ def open_synthesis(
             `insert`.
         least: shortest transition of the packaged clips [s].
         script: to perform.
+        console: shows which clips are loaded, for a robot a second or more each; None: none.
 
     Raises:
-        ConfigError: a graph of another robot, a clip that changed, `physical` without a robot; as
-            `read_graph` and `load_clip`.
+        ConfigError: a clip of the script that there is not, before any is loaded; a graph of
+            another robot, a clip that changed, `physical` without a robot; as `read_graph` and
+            `load_clip`.
     """
     body = None if robot is None else load_robot(robot)
     joins = None if body is None else RobotJoins(body)
@@ -60,8 +67,10 @@ def open_synthesis(
         if (robot or "") != made.robot:
             raise ConfigError(f"is of {made.robot or 'no robot'}, not of {robot or 'none'}",
                               source=file, field="robot")  # fmt: skip
+        if script is not None:
+            check_clips(script, made.names)
         loaded = load_clips([_beside(clip.file, file) for clip in made.clips], body,
-                       [clip.name for clip in made.clips])  # fmt: skip
+                       [clip.name for clip in made.clips], console)  # fmt: skip
         for recorded, (found, _) in zip(made.clips, loaded, strict=True):
             if recorded.digest and recorded.digest != found.digest:
                 raise ConfigError(
@@ -79,21 +88,32 @@ def open_synthesis(
     said = set() if script is None else clip_names(script)
     names += [name for name in steps if any(name == n or name.endswith(f"_{n}") for n in said)]
     files = sorted(name for name in said if Path(name).suffix in CLIP_FILES and is_file(name))
+    others = [name for name in steps if name not in names]
+    if script is not None:
+        check_clips(script, [*names, *files], others)
     limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
-    loaded = [*load_clips(names, body), *load_clips(files, body, files)]
+    loaded = load_clips([*names, *files], body, [*names, *files], console)
     return Synthesis(make_graph(loaded, limits, robot=robot or ""),
                      {entry.name: clip for entry, clip in loaded}, kind,
-                     robot_joins=joins, others=[n for n in steps if n not in names])  # fmt: skip
+                     robot_joins=joins, others=others)  # fmt: skip
 
 
 def load_clips(
-    files: Sequence[str], robot: Robot | None, names: Sequence[str] | None = None
+    files: Sequence[str],
+    robot: Robot | None,
+    names: Sequence[str] | None = None,
+    console: Console | None = None,
 ) -> list[tuple[GraphClip, Clip]]:
-    """Return the clips of files with what a graph keeps of them; see `load_clip`."""
-    loaded = []
-    for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
-        clip, digest = load_clip(file, robot)
-        loaded.append((GraphClip(name, file, clip.duration, digest), clip))
+    """Return the clips of files with what a graph keeps of them; see `load_clip`. A `console`
+    shows how far it is."""
+    loaded: list[tuple[GraphClip, Clip]] = []
+    with clips_bar(None if robot is None else console) as bar:  # else it is quick
+        task = bar.add_task("", total=len(files), rate="")
+        for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
+            bar.update(task, completed=len(loaded), rate=name)
+            clip, digest = load_clip(file, robot)
+            loaded.append((GraphClip(name, file, clip.duration, digest), clip))
+        bar.update(task, completed=len(loaded), rate="")
     return loaded
 
 

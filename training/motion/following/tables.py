@@ -82,11 +82,11 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
         ("steps", _steps(made)),
         ("off the ground", _flight(made)),
         *_walks(made),
-        ("soles off their places", f"{1000 * quality.sole_error:.2g} mm at most"),
-        ("skating, mean and largest", f"{100 * quality.skating:.2g}, "
-         f"{100 * quality.skating_largest:.2g} cm/s"),
-        ("over joint limits", f"{np.degrees(quality.limit_excess):.2g}°"),
-        ("in the floor or in itself", f"{1000 * quality.penetration:.2g} mm at most"),
+        ("soles off their places", f"{_rounded(1000 * quality.sole_error)} mm at most"),
+        ("skating, mean and largest", f"{_rounded(100 * quality.skating)}, "
+         f"{_rounded(100 * quality.skating_largest)} cm/s"),
+        ("over joint limits", f"{_rounded(np.degrees(quality.limit_excess))}°"),
+        ("in the floor or in itself", f"{_rounded(1000 * quality.penetration)} mm at most"),
         ("hands off their places, mean", hands or "not measured"),
         ("directions, RMS", directions),
         ("third derivative of joints, RMS", f"{quality.jerk:.1f} rad/s³"),
@@ -98,6 +98,11 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
         console.print(f"Can be seen, but not performed: {escape(made.clip.about.unperformed)}")
     elif not made.held:
         console.print("When it was tried, it fell or took steps of its own: --speed slows it down.")
+
+
+def _rounded(value: float) -> str:
+    """Return two digits, and 0 for what is a rounding error in mm, cm/s or degrees."""
+    return f"{value:.2g}" if value >= 1e-3 else "0"
 
 
 def print_violations(violations: Sequence[Violation], console: Console) -> None:

@@ -27,6 +27,7 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import sole_pose
 from poise.envs.sensing.realism import load_realism
+from poise.training.benchmarking.trials.agents import follows_no_motion
 from poise.training.benchmarking.trials.jobs import ANYWHERE, LONGEST
 from poise.training.benchmarking.trials.play import Watch
 from poise.training.benchmarking.trials.trial import Trial
@@ -40,15 +41,19 @@ CLIPS = (".npz", ".csv")
 
 
 def tracker_config(controller: str) -> PolicyFileConfig | None:
-    """Return the configuration of a tracker; None for any other controller.
+    """Return the configuration of a tracker; None for a controller that is no external policy.
 
-    Raises ConfigError as `controller_config`.
+    Raises ConfigError as `controller_config`, and for an external policy that tracks no motion.
     """
     yaml = Path(controller).suffix in (".yaml", ".yml")
     if not (is_policy(controller) or yaml):
         return None
     config = controller_config(controller)
-    return config if isinstance(config, PolicyFileConfig) and tracks_motion(config) else None
+    if not isinstance(config, PolicyFileConfig):
+        return None
+    if not tracks_motion(config):
+        raise follows_no_motion(controller)
+    return config
 
 
 def following(config: PolicyFileConfig, motion: str | Path) -> PolicyFileConfig:

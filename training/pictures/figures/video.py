@@ -88,11 +88,13 @@ def record_together(
     path: str | Path,
     *,
     fps: float = RATE,
+    watch: Callable[[float], object] = float,
 ) -> int:
     """Film several episodes side by side, each under its name; returns the number of frames.
 
     They run at the same time, whatever their policy periods. One that has ended stays as it was
     then, until the last has ended; one that has fallen goes to the ground first.
+    `watch` takes the time of each step [s].
 
     Raises:
         ConfigError: the path, rate or size is not valid, or sizes differ.
@@ -106,7 +108,7 @@ def record_together(
     def frame() -> np.ndarray:
         return np.hstack([_labelled(name, each) for name, each in episodes.items()])
 
-    return _film(own, Path(path), fps, 1.0, frame)[0]
+    return _film(own, Path(path), fps, 1.0, frame, watch)[0]
 
 
 class Episode:
@@ -180,7 +182,7 @@ class Episode:
 
 def _film(
     episodes: Sequence[Episode], path: Path, fps: float, slow_motion: float,
-    frame: Callable[[], np.ndarray],
+    frame: Callable[[], np.ndarray], watch: Callable[[float], object] = float,
 ) -> tuple[int, float]:  # fmt: skip
     """Play all to their ends at the same time and write what `frame` gives of them side by side.
 
@@ -199,6 +201,7 @@ def _film(
         while not all(each.over for each in episodes):
             playing = [each for each in episodes if not each.over]
             step += 1
+            watch(step * longest)
             for i, each in enumerate(episodes):
                 while not each.over and taken[i] * periods[i] < step * longest - 1e-9:
                     each.step()

@@ -186,10 +186,13 @@ def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
 
 
 def said_of_end(outcome: Outcome, trial: Trial) -> str:
-    """Return whether a robot that has not fallen follows its command at the end."""
+    """Return whether a robot that has not fallen follows its command at the end, by the same
+    criterion as `recovered`: a push is not charged with an error that was there before it."""
     held = "" if outcome.recovered else "not "
     if trial.command is None or not trial.command.array()[:3].any():
         return f"it is {held}at rest"
+    if trial.pushes or trial.kicks:
+        return f"the last two strides are {held}as near to the command as those before the push"
     return f"the last two strides are {held}as commanded"
 
 

@@ -139,15 +139,18 @@ class Script:
 
 def clip_names(script: Script) -> set[str]:
     """The names of clips and postures in a script, those that it defines among them."""
-    found: set[str] = set()
+    return {body.name for body in bodies(script)}
 
-    def look(sequence: Sequence) -> None:
+
+def bodies(script: Script) -> Iterator[ClipName | StateName]:
+    """The clips and postures in a script, and in what it defines, as often as they are there."""
+
+    def within(sequence: Sequence) -> Iterator[ClipName | StateName]:
         for term in (term for overlay in sequence.overlays for term in overlay.terms):
-            if isinstance(term.body, ClipName | StateName):
-                found.add(term.body.name)
-            elif isinstance(term.body, Sequence):
-                look(term.body)
+            if isinstance(term.body, Sequence):
+                yield from within(term.body)
+            else:
+                yield term.body
 
     for sequence in (*(define.sequence for define in script.defines), script.sequence):
-        look(sequence)
-    return found
+        yield from within(sequence)

@@ -117,6 +117,7 @@ def test_places_are_those_that_the_file_says(small: Path) -> None:
     assert knee[0] > 0.05  # a knee bends forward
 
 
+VALUES = "".join(small_bvh().partition("Frame Time:")[1:])
 FAULTS = {
     "HIERARCHY": ("HIERACHY", "line 1: 'HIERACHY' begins no line"),
     "ROOT Hips\n{": ("ROOT Hips\nOFFSET", "line 3: 'OFFSET' where '{' must stand"),
@@ -129,6 +130,7 @@ FAULTS = {
     "Frame Time: 0.033333": ("Frame Time: 0", "line 47: a frame time must be"),
     "0.950000 0.000000 0.000000": ("0.950000 0.000000", "line 48: 23 values instead of 24"),
     "0.949000": ("inf", "line 49: 'inf' is no number"),
+    VALUES: ("", "line 46: the file ends before a line 'Frame Time:'"),
     "}\nMOTION": ("MOTION", "line 46: 1 '{' are not closed"),
 }
 

@@ -87,7 +87,7 @@ def test_files_of_clips(tmp_path: Path) -> None:
     assert len(plain.skeleton.names) == 20 and other != digest
     with pytest.raises(ConfigError, match=r"is a robot's motion: say which robot's \(--robot\)"):
         load_clip(path)
-    with pytest.raises(ConfigError, match="is a motion of the robot 'humanoid', not of 'compact'"):
+    with pytest.raises(ConfigError, match=r"not of 'compact' \(--robot humanoid\)"):
         load_clip(path, robot_named("compact"))
     broken = replace(squat(), rotations=squat().rotations[:, ::-1].copy())
     with pytest.raises(ConfigError, match="turns by .* beside its axis"):

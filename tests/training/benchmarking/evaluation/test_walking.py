@@ -119,7 +119,11 @@ def test_who_raises_has_not_walked_for_a_minute() -> None:
     table = walk_tables({"ranking": ["x"], "controllers": {"x": {"walks": [level]}}})  # type: ignore[typeddict-item]
     text = io.StringIO()
     Console(file=text, width=120).print(*table)
-    assert "0 of 1" in text.getvalue()
+    assert "0 of 1" in text.getvalue() and "command" in text.getvalue()
+    kicked = {**level, "part": "walk_kick", "level": "1 m/s"}
+    table = walk_tables({"ranking": ["x"], "controllers": {"x": {"walks": [kicked]}}})  # type: ignore[typeddict-item]
+    (heading, *_) = next(table).columns
+    assert heading.header == "kick"
 
 
 def test_j50_by_phase() -> None:

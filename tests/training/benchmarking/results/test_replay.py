@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import re
 from pathlib import Path
 
 import pytest
 import yaml
+from rich.console import Console
 
 from poise.configs.errors import ConfigError
 from poise.envs.physics.collapse import DURATION
@@ -100,7 +103,17 @@ def test_several_controllers_are_filmed_side_by_side(folder: Path, tmp_path: Pat
     from PIL import Image
 
     names = ["zero", str(folder / "soft.yaml")]
-    film(folder / "out", 2, names, tmp_path / "trial.webp", fps=5.0, size=(64, 48))
+    told = io.StringIO()
+    film(
+        folder / "out",
+        2,
+        names,
+        tmp_path / "trial.webp",
+        fps=5.0,
+        size=(64, 48),
+        console=Console(file=told),
+    )
+    assert re.search(r"filming \d/\d s", told.getvalue())
     outcomes = [replay(folder / "out", 2, name).outcome for name in names]
     # a robot that has fallen is shown until it lies on the ground
     ends = [1.6 if o.fall_time is None else o.fall_time + DURATION for o in outcomes]

@@ -90,6 +90,17 @@ def test_errors_are_one_line_and_exit_code_2(
     assert text in error and error.count("\n") == 1
 
 
+def test_a_misspelt_clip_is_said_before_any_is_loaded(
+    graph: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """To retarget them for a robot takes a minute; also of a graph, and in brackets."""
+    monkeypatch.setattr("poise.training.motion.following.scripts.load_clips", pytest.fail)
+    said = "column 11: no motion 'sqaut', did you mean squat? (choices: "
+    for more in (["--robot", "humanoid"], [], ["--graph", str(graph)]):
+        assert main(["motion", "plan", "stand -> (sqaut * 2)", *more]) == 2
+        assert said in capsys.readouterr().err
+
+
 def test_wrong_settings_of_a_graph(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -233,6 +233,14 @@ def test_another_network_answers_otherwise(folder: Path, tmp_path: Path) -> None
     assert network.what == "network" and network.right is False
 
 
+@pytest.mark.parametrize("name", ["missing.onnx", "falcon-gx"])
+def test_a_name_of_nothing_has_the_known_policies_as_choices(name: str) -> None:
+    """Not the controllers, of which none can be checked."""
+    with pytest.raises(ConfigError, match=f"policy: no such policy: '{name}'") as error:
+        check_policy(name, robot("compact"))
+    assert "falcon-g1" in str(error.value) and "momentum-qp" not in str(error.value)
+
+
 @pytest.mark.parametrize(
     ("arrays", "message"),
     [

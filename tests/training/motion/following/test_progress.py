@@ -23,15 +23,16 @@ def test_lines_say_trial_and_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
         return lambda env: seen.append((trial.number, env.simulation.time))
 
     screen = io.StringIO()
-    with FollowProgress(2, Console(file=screen, width=100), others) as progress:
+    with FollowProgress(2, Console(file=screen, width=100), others, True) as progress:
         for number in range(2):
             watch = progress(Trial(number, number))
             for time in (0.0, 0.1, 10.0):
                 env: Any = SimpleNamespace(simulation=SimpleNamespace(time=time))
                 watch(env)
     assert seen == [(k, time) for k in range(2) for time in (0.0, 0.1, 10.0)]
+    assert "trial 1, filmed: 0 s" in screen.getvalue()
     lines = [line for line in screen.getvalue().splitlines() if line.startswith("trials 0/2")]
-    assert lines[0].endswith("trial 1: 0 s") and lines[-1].endswith("trial 1: 10 s")
+    assert lines[0].endswith("trial 1, filmed: 0 s") and lines[-1].endswith("filmed: 10 s")
     assert " 2/2 " in screen.getvalue()
 
 

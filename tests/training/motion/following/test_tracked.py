@@ -12,6 +12,7 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError
 from poise.training.cli.entry import main
+from poise.training.motion.following.follow import follow
 from poise.training.motion.following.tracked import follow_clip, following, tracker_config
 from tests.support.policies import helper, linear, write_graph, write_onnx, write_yaml
 from tests.support.shared import robot
@@ -46,12 +47,16 @@ def waving(path: Path, seconds: float = 1.0) -> Path:
 
 
 def test_a_tracker_is_told_from_other_controllers(tmp_path: Path) -> None:
-    """By what it sees."""
+    """By what it sees; an external policy that sees no motion is refused."""
     assert tracker_config(tracker(tmp_path)) is not None
+    assert tracker_config("motion-step") is None
     write_onnx(tmp_path / "other.onnx", linear(3, N))
     other = write_yaml(tmp_path / "other.yaml", kind="policy-file", policy="other.onnx",
                        observations=[{"term": "base_ang_vel"}])  # fmt: skip
-    assert tracker_config(str(other)) is None and tracker_config("motion-step") is None
+    with pytest.raises(ConfigError, match="other.yaml' follows no motion"):
+        tracker_config(str(other))
+    with pytest.raises(ConfigError, match="other.yaml' follows no motion"):
+        follow("standing", str(other), robot=BODY, starts=1)
 
 
 def test_it_follows_a_clip(tmp_path: Path) -> None:

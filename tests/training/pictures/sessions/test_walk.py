@@ -18,8 +18,11 @@ def test_a_walk_is_told_in_lines(capsys: pytest.CaptureFixture[str]) -> None:
     told = capsys.readouterr().out.splitlines()
     assert told[0] == "walk, humanoid: 0.4 m/s ahead, 0 left, 5 °/s for 8 s"
     assert told[1].startswith("   5.0 s  0.") and told[1].endswith(" m/s")
-    starts = ["upright after 8 s", "the last two strides are as commanded", "speed: 0.", "steps: "]
-    starts += [
+    starts = [
+        "upright after 8 s",
+        "the last two strides are as near to the command as those before the push",
+        "speed: 0.",
+        "steps: ",
         "cost of transport: ",
         "knee of the stance leg: ",
         "push: 2 N·s towards 90° at 5.5 s",
