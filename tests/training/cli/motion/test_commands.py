@@ -23,7 +23,10 @@ def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["motion", "convert", "humanoid_squat", str(part), *cut]) == 0
     assert read_bvh(part).clip.duration == pytest.approx(0.5, abs=0.04)
     assert main(["motion", "import", str(part), "--out", str(squat), "--robot", "compact"]) == 0
-    assert "over joint limits" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "over joint limits" in printed
+    command = f"poise motion follow {squat} --robot compact --controller momentum-qp"
+    assert f"perform it: {command}\n{squat}\n" in printed
     assert main(["motion", "convert", str(squat), str(back), "--robot", "compact"]) == 0
     robot_clip = read_robot_clip(squat)
     robot = read_bvh(back, "m", "y", "z").clip
