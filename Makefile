@@ -1,5 +1,5 @@
 # make setup   .venv with everything in it, kernels compiled (once; again when the requirements change)
-# make test    the tests                    make demo    the main job, with a table and plots
+# make test    the tests                    make demo    the main job: table, plots; 3 to 8 minutes
 # make check   format, lint and types       make format  put the format and imports right
 # make docs    the site of docs/ and the docstrings, in build/site
 # make build   the wheel, tried alone       make bench   time the parts of a control tick

@@ -197,7 +197,7 @@ def _load(path: Path, terrain: Terrain, description: RobotDescription | None = N
         description = description or read_description(path)
         file = model_file(description.source, path)
         spec, keyframes, ground_name, notes = _prepare(description, path, file, terrain)
-        model = _compile(spec)
+        model = _compile(spec, file)
         ground = model.geom(ground_name).id
         data, soles = _stand(model, description, keyframes, ground, file)
         if terrain.flat:
@@ -310,7 +310,7 @@ def _prepare(
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
     add_paired_ground(spec, description.ground)
-    model = _compile(spec)
+    model = _compile(spec, file)
     check_numbers(model, DYNAMICS + CONTACTS)
     check_bodies(model, description)
     ground, notes = install_ground(spec, model, description.ground)
@@ -341,8 +341,9 @@ def _read(description: RobotDescription, path: Path, file: Path | None) -> mujoc
     return read_mjcf(file, tuple(foot.body for foot in description.feet))
 
 
-def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
+def _compile(spec: mujoco.MjSpec, file: Path | None) -> mujoco.MjModel:
     try:
         return spec.compile()
     except Exception as error:  # whatever MuJoCo has
-        raise ConfigError(f"the model does not compile: {error}", field="source") from None
+        model = f"the model {file}" if file else "the model"  # MuJoCo names a line of that file
+        raise ConfigError(f"{model} does not compile: {error}", field="source") from None

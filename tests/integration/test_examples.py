@@ -102,10 +102,11 @@ def test_ppo_in_a_single_file(tmp_path):
 
 
 @pytest.mark.weekly
-def test_stable_baselines3_in_ten_lines(tmp_path):
-    """It learns and saves."""
+def test_stable_baselines3(tmp_path):
+    """It learns where there is something to gain and saves, the normalisation as well."""
     assert "fps" in run("sb3_train.py", tmp_path)
-    assert (tmp_path / "sb3_residual.zip").is_file()
+    assert (tmp_path / "sb3_step.zip").is_file()
+    assert (tmp_path / "sb3_step_normalize.pkl").is_file()
 
 
 def test_torchrl(tmp_path):

@@ -20,6 +20,7 @@ from poise.baselines.motion.retargeting.retarget import (
     ENOUGH,
     LEAD,
     SMOOTH,
+    STEPPER,
     Holds,
     Retargeted,
     retarget_freely,
@@ -38,6 +39,7 @@ from poise.envs.robots.robot import Robot
 from .tried import held_walk
 from .walked import find_commands, walked_clip
 
+IN_PLACE = "momentum-qp"  # performs motions without steps
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
 COMES_DOWN, CLIMB = 1.5, 0.2  # [s] in which a foot is down; [legs] that the ground rises at least
@@ -81,6 +83,13 @@ class RetargetedClip(NamedTuple):
     sunk: float = 0.0
     spread: float = 1.0
     held: bool = True
+
+    @property
+    def performer(self) -> str:
+        """The controller that performs it; empty where none does."""
+        if self.clip.about.unperformed:
+            return ""
+        return self.walker or (IN_PLACE if self.clip.planted is None else STEPPER)
 
 
 def retarget_clip(

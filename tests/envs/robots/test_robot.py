@@ -262,7 +262,7 @@ WRONG = [
         ["root", "moving parts other than the robot", "hinge joint"],
     ),
     ({"world": BALL.replace("<joint type='ball'/>", "<freejoint/>")}, ["root"]),
-    ({"leg": LEG.replace('axis="0 1 0"', 'axis="0 0 0"')}, ["does not compile"]),
+    ({"leg": LEG.replace('axis="0 1 0"', 'axis="0 0 0"')}, ["biped.xml does not compile"]),
     ({"feet": []}, ["feet", "two feet"]),
     ({"feet": [{"name": "l", "body": "left_foot"}]}, ["feet", "two feet"]),
     ({"feet": [{"name": "l", "body": "x"}, {"name": "r", "body": "right_foot"}]}, ["feet[0]"]),

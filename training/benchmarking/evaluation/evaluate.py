@@ -13,12 +13,16 @@ from poise.configs.files import packaged, packaged_folder
 from poise.configs.reading import read_json, read_yaml
 from poise.envs.physics.pushes.sampler import LimitTable
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmarking.trials.push_limits import PushLimits, load_limits, write_limits
+from poise.training.benchmarking.trials.push_limits import (
+    BASELINE,
+    PushLimits,
+    load_limits,
+    write_limits,
+)
 from poise.training.running.summary import Summary
 
 from .run import Run
 
-REFERENCE = "momentum-qp"
 RESTLESS = ("simbicon",)  # always marks time, and so never counts as recovered
 
 
@@ -122,7 +126,7 @@ def benchmark(
     chosen = controllers or default_controllers(load_robot(robot).name)
     run = Run(
         chosen, suite, out, robot, seed, workers, backend, trials,
-        overwrite, console, reference=REFERENCE, measured=PushLimits, realism=realism,
+        overwrite, console, reference=BASELINE, measured=PushLimits, realism=realism,
         physics=physics,
     )  # fmt: skip
     return run.play(timed=True)
@@ -134,10 +138,10 @@ def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
     Controllers that walk, and policies on them, are left out: without commands they are equivalent
     to `feedback-step`.
     """
-    elsewhere = {REFERENCE, *RESTLESS, *walking_controllers()}
+    elsewhere = {BASELINE, *RESTLESS, *walking_controllers()}
     others = (name for name in available_controllers() if name not in elsewhere)
     policies = (name for name in packaged_policies(robot) if not walks(name))
-    return (REFERENCE, *others, *policies)
+    return (BASELINE, *others, *policies)
 
 
 def packaged_policies(robot: str) -> list[str]:

@@ -116,4 +116,6 @@ def check_forces(pushes: PushSampler) -> None:
     if pushes.no_push or pushes.unit == "delta_v":
         raise ValueError("pushes: they are forces, in every trial")
     if pushes.limit_table is not None:
-        raise ValueError("pushes: limit_table belongs in a file of configs/limits")
+        raise ValueError("pushes: limit_table is not of a suite: pass it with --limits FILE, whose "
+                         "keys are robot, fingerprint, controller and table; poise evaluate with "
+                         "--suite envelope and --write-limits FILE writes one")  # fmt: skip

@@ -16,6 +16,8 @@ from poise.envs.physics.pushes.sampler import LIMIT_DURATION, LimitTable
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot
 
+BASELINE = "momentum-qp"  # whose J50 the packaged limits have
+
 
 @dataclass(frozen=True)
 class MeasuredLimits:
@@ -35,7 +37,8 @@ class PushLimits:
         table: J50 [N·s] of the baseline for 0.1 s square pushes, or None.
         controller: whose J50 the table has, or None.
         standing: the robot's state at rest.
-        scale: what `fraction` is a fraction of: "baseline J50", or "ankle limit" without a table.
+        scale: what `fraction` is a fraction of: "baseline J50", "J50 of NAME" of another
+            controller's table, or "ankle limit" without one.
     """
 
     def __init__(
@@ -43,7 +46,9 @@ class PushLimits:
     ):
         prepare()  # several kernels at once, before this process compiles one after the other
         self.robot, self.table, self.controller = robot, table, controller
-        self.scale = "ankle limit" if table is None else "baseline J50"
+        others = controller is not None and controller != BASELINE
+        known = f"J50 of {controller}" if others else "baseline J50"
+        self.scale = "ankle limit" if table is None else known
         self.omega = robot.omega
         self.standing = Simulation(robot).state.copy()
 

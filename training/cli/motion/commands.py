@@ -1,5 +1,6 @@
 """`poise motion …`: files of motion capture, on a robot, and performed."""
 
+import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -204,6 +205,9 @@ def bring(
     print_retargeted(made, terminal())
     if video is not None:
         _film(video, body, clip, made)
+    if made.performer:
+        words = ["poise", "motion", "follow", str(out), "--robot", robot]
+        print(f"perform it: {shlex.join([*words, '--controller', made.performer])}")
     print(out)
 
 

@@ -43,6 +43,7 @@ class Fault:
 
 def find_faults(check: RobotCheck) -> Iterator[Fault]:
     """The faults that figures of a check show: of the model, as it stands, on its legs, at rest."""
+    yield from _motors(check)
     for note in check.notes:
         yield Fault("changed", note)
     yield from _light_joints(check.dynamics)
@@ -63,6 +64,20 @@ def find_faults(check: RobotCheck) -> Iterator[Fault]:
 def _first(texts: Sequence[str], most: int) -> str:
     more = f" and {len(texts) - most} more" if len(texts) > most else ""
     return ", ".join(texts[:most]) + more
+
+
+def _motors(check: RobotCheck) -> Iterator[Fault]:
+    left, right = (leg.joints for leg in check.legs)
+    if len(left) != len(right):
+        return
+    bare = set(check.without_motor)
+    pairs = [*zip(left, right, strict=True), *zip(right, left, strict=True)]
+    if missing := [f"{a} (its twin {b} has one)" for a, b in pairs if a in bare and b not in bare]:
+        yield Fault(
+            "no motor",
+            f"{_first(missing, SHOWN)}: give the model an actuator, or the joint a limit in "
+            "torque_limits",
+        )
 
 
 def _light_joints(model: Dynamics) -> Iterator[Fault]:

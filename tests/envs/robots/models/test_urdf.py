@@ -214,7 +214,7 @@ REFUSED = {
     ),
     "a link without mass": (
         {"extra": part("hand", "trunk", "revolute").replace("0.5", "0")},
-        "source: the model does not compile: .*hand",
+        r"source: the model .*biped\.urdf does not compile: .*hand",
     ),
     "a sole's link that is fixed to the foot": (
         {

@@ -142,6 +142,9 @@ def test_parts_are_played_one_after_the_other(limits: PushLimits) -> None:
     assert suite.resized(10**4).random.trials == 10**4 and both.resized(10**4) == both
 
 
+SHARE = {"magnitude": [0.8, 1.2], "unit": "controller_fraction"}
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
@@ -154,6 +157,10 @@ def test_parts_are_played_one_after_the_other(limits: PushLimits) -> None:
         ({"random": {"trials": 0}}, "random.trials.*at least 1"),
         ({"random": {"pushes": {"magnitude": [1, 2], "unit": "delta_v"}}}, "pushes"),
         ({"random": {"pushes": {"magnitude": [2, 1], "unit": "impulse"}}}, "magnitude"),
+        (
+            {"random": {"pushes": {**SHARE, "limit_table": {"directions": [0], "impulses": [20]}}}},
+            "limit_table is not of a suite: pass it with --limits FILE.*fingerprint.*table",
+        ),
         ({"envelope": {"impulses": [0.5, 0.2]}}, "impulses"),
         ({"grid": {"magnitudes": []}}, "magnitudes"),
         ({"quiet": {"pushes": None}}, "pushes.*choices: trials"),

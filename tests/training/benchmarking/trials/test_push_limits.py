@@ -55,6 +55,8 @@ def test_fractions_are_of_the_ankle_limit_or_of_the_table(robot: Robot) -> None:
     assert table.fraction(Push("torso", 0.5, 0.1, 15.0, 90.0)) == pytest.approx(1.0)
     assert table.fraction(Push("torso", 0.5, 0.3, 15.0, 90.0)) < 1.0
     assert (ankle.scale, table.scale) == ("ankle limit", "baseline J50")
+    assert PushLimits(robot, table.table, "momentum-qp").scale == "baseline J50"
+    assert PushLimits(robot, table.table, "capture-step").scale == "J50 of capture-step"
 
 
 def test_a_written_file_reads_back(robot: Robot, tmp_path: Path) -> None:

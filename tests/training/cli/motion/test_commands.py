@@ -25,6 +25,8 @@ def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["motion", "import", str(part), "--out", str(squat), "--robot", "compact"]) == 0
     printed = capsys.readouterr().out
     assert "over joint limits" in printed and "e-" not in printed  # rounding errors are 0
+    command = f"poise motion follow {squat} --robot compact --controller momentum-qp"
+    assert f"perform it: {command}\n{squat}\n" in printed
     assert main(["motion", "convert", str(squat), str(back), "--robot", "compact"]) == 0
     robot_clip = read_robot_clip(squat)
     robot = read_bvh(back, "m", "y", "z").clip

@@ -132,6 +132,19 @@ def test_straight_knees_and_a_foot_without_roll_are_warned_of(tmp_path: Path) ->
 
 
 @pytest.mark.usefixtures("no_controllers")
+def test_a_motor_of_one_leg_alone_is_warned_of(tmp_path: Path) -> None:
+    """Before all else; joints that neither side drives are meant to be so."""
+    left, right = (f'<motor joint="{side}_knee" ctrlrange="-50 50"/>' for side in ("left", "right"))
+    one = motors(ctrlrange="-50 50").replace(right, "")
+    first = check_robot(write_biped(tmp_path, extra=one)).faults[0]
+    assert first.kind == "no motor"
+    assert first.text.startswith("right_knee (its twin left_knee has one): ")
+    found = check_robot(write_biped(tmp_path, extra=one.replace(left, "")))
+    assert set(found.without_motor) == {"left_knee", "right_knee"}
+    assert "no motor" not in texts(found)
+
+
+@pytest.mark.usefixtures("no_controllers")
 def test_a_sole_that_rocks_is_warned_of(tmp_path: Path) -> None:
     """Of three pairs of balls one behind the other, the middle one hangs 1 mm lower."""
 
