@@ -13,12 +13,15 @@ import sys
 from pathlib import Path
 
 from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.reading import MIB, read_text
 
 HOLDER = ".poise.lock"  # names the process that holds the lock; meaningless after a kill
 #: environment variable: index of a run in a job array
 ARRAY = "SLURM_ARRAY_TASK_ID"
 #: errors of cluster file systems that cannot lock a folder, or lock nothing
 NO_LOCKS = (errno.EBADF, errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
+#: a received folder may hold a link, through which another file would be written, or a pipe
+OPEN = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
 class FolderLock(contextlib.AbstractContextManager):
@@ -30,8 +33,8 @@ class FolderLock(contextlib.AbstractContextManager):
     warning line is printed.
 
     Raises:
-        PoiseError: another process, which is named, holds the lock, or the folder cannot be
-            created.
+        PoiseError: another process, which is named, holds the lock, the folder cannot be created,
+            or the file that names the process is a link.
     """
 
     def __init__(self, path: Path):
@@ -39,6 +42,8 @@ class FolderLock(contextlib.AbstractContextManager):
         self._made = not path.exists()
         try:
             path.mkdir(parents=True, exist_ok=True)
+            if (path / HOLDER).is_symlink():
+                raise PoiseError(f"{path / HOLDER}: is a link, as no run leaves one: remove it")
             self._file = os.open(path, os.O_RDONLY)
             self._lock()
         except BlockingIOError:
@@ -50,7 +55,9 @@ class FolderLock(contextlib.AbstractContextManager):
         command = shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
         text = f"{os.getpid()}\n{command}\n{socket.gethostname()}\n"
         with contextlib.suppress(OSError):  # an exhausted disk is reported by later writes
-            (path / HOLDER).write_text(text, "utf-8", "replace")
+            with open(os.open(path / HOLDER, OPEN, 0o644), "wb", buffering=0) as file:
+                file.truncate()
+                file.write(text.encode("utf-8", "replace"))
         _remove_parts(path)
 
     def _lock(self) -> None:
@@ -60,7 +67,7 @@ class FolderLock(contextlib.AbstractContextManager):
             if error.errno not in NO_LOCKS:
                 raise
             os.close(self._file)
-            self._file = os.open(self.path / HOLDER, os.O_RDWR | os.O_CREAT, 0o644)
+            self._file = os.open(self.path / HOLDER, OPEN, 0o644)
             try:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as second:
@@ -113,8 +120,8 @@ def _of_array() -> str:
 def _holder(path: Path) -> str:
     """Describe the process that holds the lock."""
     try:
-        process, command, host = (path / HOLDER).read_text("utf-8").splitlines()
-    except (OSError, ValueError):
+        process, command, host = read_text(path / HOLDER, MIB).splitlines()
+    except (ConfigError, ValueError):
         return "another process"
     elsewhere = f" on {host}" if host != socket.gethostname() else ""
     return f"process {process}{elsewhere} ({command})"

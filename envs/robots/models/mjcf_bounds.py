@@ -26,6 +26,9 @@ LISTS = {"bodies": 1000, "joints": 1000, "geoms": 5000, "keys": 1000, "sensors":
 MEMORY = 256 * MIB  # of a simulation's stack
 KEPT = 256 * MIB  # of meshes and textures, from one compilation to the next
 LONGEST = 10_000  # of what elements may reserve: user data, keyframes, dimensions of a sensor
+MOST_ITERATIONS = 1000  # of a solver, in a physics step; MuJoCo simulates one as it compiles
+_ITERATIONS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations",
+               "sdf_iterations", "sdf_initpoints")  # fmt: skip
 _RESERVED = ("nkey", "nuserdata", "nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom",
              "nuser_jnt", "nuser_sensor", "nuser_site", "nuser_tendon")  # fmt: skip
 
@@ -63,6 +66,8 @@ class MjcfText:
         if depth > NESTED:
             raise ConfigError(f"more than {NESTED} files include each other")
         text = read_text(path, MJCF_BYTES)  # MuJoCo itself takes names that are no text
+        if "<!DOCTYPE" in text:  # entities, which some parsers fill in from other files
+            raise ConfigError(f"{path} has a document type, which no model needs")
         self._size += len(text)
         if self._size > MJCF_BYTES:
             raise ConfigError(f"its files are together larger than {MJCF_BYTES / MIB:g} MiB")
@@ -134,6 +139,9 @@ def check_spec(spec: mujoco.MjSpec, folders: set[Path]) -> None:
     for name in _RESERVED:
         if getattr(spec, name) > LONGEST:
             raise ConfigError(f"size: {name} must be at most {LONGEST}")
+    for name in _ITERATIONS:
+        if getattr(spec.option, name, 0) > MOST_ITERATIONS:
+            raise ConfigError(f"option: {name} must be at most {MOST_ITERATIONS}")
     if max(spec.memory, spec.nstack * 8, spec.njmax * 1000, spec.nconmax * 1000) > MEMORY:
         raise ConfigError(f"size: memory must be at most {MEMORY / MIB:g} MiB")
     reserved = [x for s in spec.sensors for x in (s.dim, s.nsample)]

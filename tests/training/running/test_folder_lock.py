@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import PoiseError
+from poise.configs.files import write_atomic
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
@@ -88,3 +89,29 @@ def test_every_command_that_writes_to_a_folder_holds_it(tmp_path: Path) -> None:
             with pytest.raises(PoiseError, match=f"out: process {os.getpid()} .*is writing there"):
                 call()
         assert [path.name for path in out.iterdir()] == [HOLDER]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_nothing_is_written_through_a_link(tmp_path: Path, there: bool) -> None:
+    """That a received folder holds in place of the lock's file or of a half file."""
+    mine, out = tmp_path / "mine", tmp_path / "out"
+    out.mkdir()
+    if there:
+        mine.write_text("mine")
+    (out / HOLDER).symlink_to(mine)
+    with pytest.raises(PoiseError, match=rf"out/{HOLDER}: is a link"):
+        FolderLock(out)
+    assert (out / HOLDER).is_symlink()
+    (out / HOLDER).unlink()
+    (out / f".file.{os.getpid()}.part").symlink_to(mine)
+    write_atomic(out / "file", "new")
+    assert (out / "file").read_text() == "new" and not (out / "file").is_symlink()
+    assert mine.read_text() == "mine" if there else not mine.exists()
+
+
+def test_a_pipe_in_place_of_the_locks_file_is_not_waited_for(tmp_path: Path) -> None:
+    """Neither to write nor to read who holds the folder."""
+    os.mkfifo(tmp_path / HOLDER)
+    with FolderLock(tmp_path):
+        with pytest.raises(PoiseError, match="another process is writing there"):
+            FolderLock(tmp_path)

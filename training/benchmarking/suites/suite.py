@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
@@ -72,10 +74,23 @@ class Suite(Standard):
             raise ValueError("scenarios: must be the only part, each of them at its own level")
         if self.scenarios is not None and self.scenarios.duration > self.duration:
             raise ValueError(f"duration: a scenario lasts {self.scenarios.duration:g} s")
+        self._check_starts()
         stems = [Path(level).stem for level in (self.realism, *self.levels)]
         for stem in stems:
             if stems.count(stem) > 1:
                 raise ValueError(f"levels: {stem} comes twice, or is also the suite's own realism")
+
+    def _check_starts(self) -> None:
+        """Raise ValueError for first pushes that may begin when their trial is over."""
+        cells: dict[str, tuple[Any, float]] = {"start": (self, self.duration)}
+        for name, part in self.parts.items():
+            cells[f"{name}.start"] = part, self.duration
+            cells[f"{name}.pushes.start"] = getattr(part, "pushes", None), self.duration
+        for name, each in self.scenarios.each.items() if self.scenarios else ():
+            cells[f"scenarios.each.{name}.pushes.start"] = each.pushes, each.duration
+        for name, (cell, duration) in cells.items():
+            if np.max(getattr(cell, "start", 0.0)) >= duration:
+                raise ValueError(f"{name}: must lie within the duration, {duration:g} s")
 
     @property
     def parts(self) -> dict[str, SuitePart]:

@@ -51,6 +51,13 @@ BOMBS = {
     "mesh file": (asset('<mesh name="m" file="m.stl"/>'), "m.stl is larger than 16 MiB"),
     "mesh": (asset('<mesh name="m" builtin="supertorus" params="10000 1 1 1"/>'), "params"),
     "memory": ('<size memory="100G"/>', "memory"),
+    "document type": ('<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]>', "document type"),
+    "document type of a part": ('<include file="typed.xml"/>', "typed.xml has a document type"),
+    **{f"{solver} of {name}": (
+        f'<option solver="{solver}" tolerance="0" {name}="2000000000"/>',
+        f"option: {name} must be at most 1000",
+    ) for solver, name in (("PGS", "iterations"), ("CG", "iterations"), ("Newton", "ls_iterations"),
+                           ("PGS", "noslip_iterations"), ("Newton", "sdf_initpoints"))},
     "constraints": ('<size njmax="2000000000"/>', "memory"),
     "keyframes": (f'<size nkey="200000000"/>{world(BODY)}', "nkey"),
     "sensor": ('<sensor><user dim="100000000" name="u"/></sensor>', "numbers each"),
@@ -91,6 +98,7 @@ def write_parts(folder: Path) -> None:
         file.truncate(ASSET_BYTES + 1)
     for k in range(2):
         (folder / f"part{k}.xml").write_text(f"<mujoco><!-- {'x' * (MJCF_BYTES // 2)} --></mujoco>")
+    (folder / "typed.xml").write_text("<!DOCTYPE mujoco><mujoco/>")
     (folder / "model.xml").write_text(f"<mujoco>{world('<site/>' * 300)}</mujoco>")
     (folder / "sub").mkdir()
     os.mkfifo(folder / "sub/pipe")

@@ -143,6 +143,8 @@ def test_parts_are_played_one_after_the_other(limits: PushLimits) -> None:
 
 
 SHARE = {"magnitude": [0.8, 1.2], "unit": "controller_fraction"}
+#: pushes that may begin after the trial
+LATE = {"magnitude": [1, 2], "unit": "impulse", "start": [0.5, 100]}
 
 
 @pytest.mark.parametrize(
@@ -164,6 +166,19 @@ SHARE = {"magnitude": [0.8, 1.2], "unit": "controller_fraction"}
         ({"envelope": {"impulses": [0.5, 0.2]}}, "impulses"),
         ({"grid": {"magnitudes": []}}, "magnitudes"),
         ({"quiet": {"pushes": None}}, "pushes.*choices: trials"),
+        ({"start": 3.0, "grid": {}, "duration": 3.0}, ": start: must lie within the duration, 3 s"),
+        *(
+            ({name: {"pushes": {**LATE, **more}}}, rf": {name}.pushes.start: must lie within")
+            for name, more in (
+                ("random", {}), ("sustained", {}), ("sequence", {"count": [2, 2]}),
+                ("gusts", {"count": [2, 2]}), ("walk_repeated", {"count": [2, 2]}),
+            )
+        ),
+        ({"walk_push": {"start": 6.0}}, ": walk_push.start: must lie within the duration, 6 s"),
+        (
+            {"scenarios": {"each": {"crowd": {"pushes": LATE, "duration": 5.0}}}, "duration": 9.0},
+            ": scenarios.each.crowd.pushes.start: must lie within the duration, 5 s",
+        ),
         ({"duration": "long", "quiet": {}}, "duration.*a number"),
     ],
 )
