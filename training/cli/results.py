@@ -73,7 +73,7 @@ def replay(
     video: Path | None = None,
     plot: Path | None = None,
     allow: Allow = (),
-) -> None:
+) -> int:
     """Simulate one trial of a result again and check that it ends as recorded.
 
     Args:
@@ -83,6 +83,9 @@ def replay(
             side by side.
         video: an MP4 or WebP file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
+
+    Returns:
+        1 where it differs from the record, else 0.
     """
     if video is not None:
         from poise.envs.viewing.gl import choose_gl_backend
@@ -109,6 +112,7 @@ def replay(
     for path in (video, plot):
         if path is not None:
             print(path)
+    return int(any(done.differences for done in replays))
 
 
 def _print_replay(done: "Replay") -> None:

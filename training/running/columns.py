@@ -68,6 +68,11 @@ class Figure:
         """Return ≥ or ≤ of a bound, else an empty text."""
         return SIGNS[entry.get(self.bound)] if self.bound else ""
 
+    def has_range(self, entry: Entry) -> bool:
+        """Return whether the interval says anything: not that of a bound, nor one of no width."""
+        low, high = self.interval(entry) or (None, None)
+        return bool(self.ends) and not self.sign(entry) and (low is None or low != high)
+
     def text(self, entry: Entry) -> str:
         """Return the figure with sign and interval, as in the terminal; "–" where it is missing."""
         value = self.value(entry)
@@ -77,7 +82,7 @@ class Figure:
         if not self.ends:
             text += f", {entry[self.beside]}" if self.beside else ""
             return f"{text} of {entry[self.of]}" if self.of else text
-        return f"{text} {self.range(entry)}"
+        return f"{text} {self.range(entry)}" if self.has_range(entry) else text
 
     def range(self, entry: Entry) -> str:
         """Return the interval as in the terminal, with "–" for an unknown end."""
@@ -108,14 +113,14 @@ J50 = Figure("j50", "J50", ".1f", "N·s", "impulse that half of the trials survi
 # of a controller
 J50_MEAN = Figure("j50_mean", "mean J50", ".1f", "N·s",
                   "impulse that half of the trials survive, mean over directions",
-                  ends="j50_mean_ci95")  # fmt: skip
+                  ends="j50_mean_ci95", bound="j50_mean_bound")  # fmt: skip
 J50_PER_MASS = Figure("j50_mean_per_mass", "J50/m", ".3f", "N·s/kg",
                       "the same over the robot's mass", csv="j50_per_mass")  # fmt: skip
 J50_WORST = Figure("j50_min", "worst J50", ".1f", "N·s", "in the worst direction", csv="j50_worst")
 J50_BOUNDED = Figure("j50_bounded", "bounds", ".0f", words="directions where J50 is only a bound",
                      csv="j50_bounds", where=_some("j50_bounded"))  # fmt: skip
 ETA_MEAN = Figure("eta_mean", "η mean", ".2f", words="J50 over the ankle limit, mean of all",
-                  ends="eta_mean_ci95")  # fmt: skip
+                  ends="eta_mean_ci95", bound="j50_mean_bound")  # fmt: skip
 ETA_WORST = Figure("eta_min", "η worst", ".2f", words="in the worst direction", csv="eta_worst")
 #: in units of the suite's limit; each table sets its own unit
 J50_SCALED = Figure(
@@ -192,6 +197,7 @@ J50_KEPT = Figure("j50_kept", "J50 kept", ".2f", words="over that of the first l
                   ends="j50_kept_ci95")  # fmt: skip
 AT_LEVEL = (
     replace(J50_MEAN, words=""),
+    J50_BOUNDED,
     J50_KEPT,
     RECOVERED,
     NOT_FALLEN,

@@ -73,11 +73,15 @@ class Direction(TypedDict, total=False):
 
 
 class EnvelopeFigures(TypedDict, total=False):
-    """J50 over the directions, of pushes of `push_duration` [s], which older results lack."""
+    """J50 over the directions, of pushes of `push_duration` [s], which older results lack.
+
+    `j50_mean_bound` is the kind of bound that J50 is in every direction, see `LogisticFit.bound`.
+    """
 
     push_duration: float
     j50_mean: float
     j50_mean_ci95: Interval
+    j50_mean_bound: Bound
     j50_mean_per_mass: float
     j50_min: float
     j90_mean: Number
@@ -136,7 +140,7 @@ class RealismLevel(Rate, total=False):
 
     Rates are of random pushes, if there are any, else of all trials. `stood` counts the unpushed
     trials without a fall. `j50_kept` is the J50 over that of the suite's own level, which comes
-    first.
+    first; null where either is only a bound.
     """
 
     level: Required[str]
@@ -144,6 +148,8 @@ class RealismLevel(Rate, total=False):
     unpushed: int
     j50_mean: float
     j50_mean_ci95: Interval
+    j50_mean_bound: Bound
+    j50_bounded: int
     j50_kept: Number
     j50_kept_ci95: Interval | None
     torque_variation_median: Number

@@ -21,6 +21,7 @@ from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.problems import Problem
 from poise.configs.schema import to_dict
 from poise.training.benchmarking.evaluation import run
+from poise.training.benchmarking.results.read import load_results
 from poise.training.cli import entry
 from poise.training.cli import train as train_command
 from poise.training.cli.entry import main
@@ -386,6 +387,11 @@ def test_evaluate_and_replay(
     assert main(["replay", out, "--trial", "1"]) == 0
     shown = capsys.readouterr().out
     assert "trial 1, zero: fell" in shown and "exactly as recorded" in shown
+    path = tmp_path / "out/trials.csv"
+    max_com = load_results(out).record("zero", 1).line["max_com"]
+    path.write_text(path.read_text().replace(max_com, "0.5"))
+    assert main(["replay", out, "--trial", "1"]) == 1
+    assert "differs from the record" in capsys.readouterr().out
 
 
 def test_ctrl_c_says_how_to_go_on(

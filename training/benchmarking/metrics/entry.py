@@ -123,6 +123,7 @@ def envelope(
         "push_duration": float(duration[0]),
         "j50_mean": fit.j50_mean,
         "j50_mean_ci95": fit.j50_mean_ci,
+        "j50_mean_bound": fit.mean_bound,
         "j50_mean_per_mass": fit.j50_mean / mass,
         "j50_min": min(f.fit.j50 for f in fit.fits),
         "j90_mean": float(np.mean([f.fit.j90 for f in fit.fits])),
@@ -195,9 +196,12 @@ def _levels(evaluated: Evaluated, suite: Suite) -> list[RealismLevel]:
             direction, impulse, _ = pushes(aimed)
             fit = mean_over_directions(direction, impulse, won(aimed))
             here["j50_mean"], here["j50_mean_ci95"] = fit.j50_mean, fit.j50_mean_ci
+            here["j50_mean_bound"], here["j50_bounded"] = fit.mean_bound, fit.bounded
             if found:
                 first = found[0]["j50_mean"], found[0]["j50_mean_ci95"]
                 kept = ratio(*first, fit.j50_mean, fit.j50_mean_ci)
+                if found[0]["j50_mean_bound"] or fit.mean_bound:
+                    kept = None, None  # a bound over a value is no estimate
                 here["j50_kept"], here["j50_kept_ci95"] = kept
         found.append(here)
     return found

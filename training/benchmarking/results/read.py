@@ -1,10 +1,11 @@
 """The folder of a finished result, read back and checked."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import cast
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import is_file, is_folder, read_table
@@ -12,14 +13,15 @@ from poise.configs.spellings import respelled
 from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
 from poise.training.benchmarking.diagnosis.words import diagnosis_of, why
 from poise.training.benchmarking.evaluation.folder import Settings, read_settings
-from poise.training.benchmarking.metrics.evaluated import WALK_PUSH
+from poise.training.benchmarking.metrics.evaluated import RATED, WALK_PUSH
+from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.table import CASE_COLUMNS, COLUMNS, read_trial
 from poise.training.benchmarking.trials.trial import FORMER, Trial
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
-from poise.training.running.summary import Summary
+from poise.training.running.summary import Entry, Summary
 
 from .judged_again import judged_again
-from .summary import read_summary
+from .summary import MARGIN, read_summary
 
 #: columns that older results lack
 LATER = (*DIAGNOSIS_COLUMNS, "until", "own_speed_error", "own_turn_error", "last_speed_error",
@@ -196,6 +198,9 @@ def _check(folder: Path, settings: Settings, summary: Summary, records: tuple[Re
             raise ConfigError(f"{shown(record.controller)} is not in {SUMMARY}",
                               source=folder / TRIALS, field="controller")  # fmt: skip
         counts[record.controller] += 1
+    if summary["seed"] != settings.seed:
+        raise ConfigError(f"is {summary['seed']}, but {SETTINGS} has {settings.seed}",
+                          source=folder / SUMMARY, field="seed")  # fmt: skip
     for name, entry in entries.items():
         if counts[name] != entry["evaluated"]:
             raise ConfigError(
@@ -203,3 +208,21 @@ def _check(folder: Path, settings: Settings, summary: Summary, records: tuple[Re
                 f"{entry['evaluated']}: cut off?",
                 source=folder / TRIALS,
             )
+        _check_rate(folder, name, entry, [r for r in records if r.controller == name])
+
+
+def _check_rate(folder: Path, name: str, entry: Entry, records: Sequence[Record]) -> None:
+    """Raise ConfigError unless the counts of a controller are those of its trials."""
+    own = [r for r in records if LEVEL not in r.part and r.met_by_all]
+    own = [r for r in own if r.part in RATED] or own
+    counted = {
+        "trials": len(own),
+        "recovered": sum(r.recovered for r in own),
+        "fallen": sum(r.fallen for r in own),
+        "never_fell_rate": sum(r.upright for r in own) / max(len(own), 1),
+    }
+    for key, found in counted.items():
+        told = cast("float | None", entry.get(key))  # older results lack some
+        if told is not None and abs(told - found) > MARGIN:
+            why = f"is {told:.6g}, but {TRIALS} has {found:.6g}"
+            raise ConfigError(why, source=folder / SUMMARY, field=f"controllers.{name}.{key}")

@@ -1,5 +1,7 @@
 """Reading of summary.json, which may come from an untrusted source: all of it is validated."""
 
+import math
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,7 @@ from poise.configs.reading import is_file, read_json
 from poise.configs.schema import checked
 from poise.configs.spellings import respelled
 from poise.configs.texts import check_shown
+from poise.training.benchmarking.evaluation.tables import ranked
 from poise.training.running.summary import Summary, check_format
 from poise.training.running.trial_figures import Rate
 
@@ -21,6 +24,10 @@ ENTRY = (
     ("sectors", "fraction_of", "fraction50"),
 )  # fmt: skip
 LEVEL = (("stood", "unpushed"), ("j50_mean", "j50_mean_ci95"))  # the same, of a level
+#: keys of shares, their intervals, and p-values; and of figures that are not negative
+SHARE = re.compile(r"^((recovered|never_fell|fallen|up_again)_(rate|ci95)|p_mcnemar)$")
+SIZE = re.compile(r"^(j50|j90|f50|fraction50|share50|eta)(?!_gain)")
+MARGIN = 1e-9  # of numbers that were computed and written
 LARGEST = 2**53  # of whole numbers except seeds: a float represents each up to here
 PAIR = (("both", "only_a", "only_b", "neither", "p_mcnemar"),)  # the same, of a pair
 
@@ -37,9 +44,13 @@ def read_summary(path: str | Path) -> Summary:
     for field, value in _values(data):
         _check_value(field, value, path)
     summary = checked(Summary, data, path)
+    for field, value in _figures(data):
+        _check_figure(field, value, path)
     entries = summary["controllers"]
     if not entries or sorted(summary["ranking"]) != sorted(entries):
         raise ConfigError("must name all controllers", source=path, field="ranking")
+    if summary["ranking"] != ranked({name: entries[name] for name in summary["ranking"]}):
+        raise ConfigError("must name the best controller first", source=path, field="ranking")
     named = [[summary["reference"]], *([pair["a"], pair["b"]] for pair in summary["pairs"]),
              *(curves["controllers"] or [""] for curves in summary["step_limits"])]  # fmt: skip
     for name in (name for names in named for name in names):
@@ -93,6 +104,30 @@ def _check_value(field: str, value: object, path: Path) -> None:
                           field=field)  # fmt: skip
 
 
+def _figures(data: Any, field: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the numbers of mappings and the intervals in plain data, each with its dotted field."""
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+        name = f"{field}[{key}]" if isinstance(data, list) else f"{field}.{key}".lstrip(".")
+        if isinstance(value, dict) or (isinstance(value, list) and not name.endswith("_ci95")):
+            yield from _figures(value, name)
+        elif isinstance(value, (int, float, list)) and isinstance(data, dict):
+            yield name, value
+
+
+def _check_figure(field: str, value: Any, path: Path) -> None:
+    """Raise ConfigError for an interval whose ends are swapped, and for a figure or an end of its
+    interval that is out of range."""
+    ends = [end for end in value if end is not None] if isinstance(value, list) else [value]
+    if ends != sorted(ends):
+        raise ConfigError(f"must have its lower end first, not {shown(value)}", source=path,
+                          field=field)  # fmt: skip
+    key = field.rpartition(".")[2]
+    most = 1.0 if SHARE.search(key) else math.inf
+    if (most == 1.0 or SIZE.match(key)) and not all(-MARGIN <= e <= most + MARGIN for e in ends):
+        words = "from 0 to 1" if most == 1.0 else "0 or more"
+        raise ConfigError(f"must be {words}, not {shown(value)}", source=path, field=field)
+
+
 def _check_together(
     entry: Mapping[str, object], groups: tuple[tuple[str, ...], ...], path: Path, field: str
 ) -> None:
@@ -108,3 +143,6 @@ def _check_rate(rate: Rate, path: Path, field: str) -> None:
     if not 0 <= rate["recovered"] <= rate["trials"]:
         raise ConfigError(f"must be a whole number from 0 to trials, not {rate['recovered']}",
                           source=path, field=f"{field}.recovered")  # fmt: skip
+    if abs(rate["recovered_rate"] - rate["recovered"] / rate["trials"]) > MARGIN:
+        raise ConfigError(f"must be recovered over trials, not {shown(rate['recovered_rate'])}",
+                          source=path, field=f"{field}.recovered_rate")  # fmt: skip

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .fits import LogisticFit, check_trials, fit_logistic, solve_weighted
+from .fits import Bound, LogisticFit, check_trials, fit_logistic, solve_weighted
 from .rates import Interval, percentile_interval
 
 PARAMETERS = 2  # of one logistic fit
@@ -38,6 +38,12 @@ class EnvelopeFit:
     j50_mean: float
     j50_mean_ci: Interval
     bounded: int
+
+    @property
+    def mean_bound(self) -> Bound | None:
+        """The kind of bound that J50 is in every direction; None where they differ, or none is."""
+        kinds = {each.fit.bound for each in self.fits}
+        return kinds.pop() if len(kinds) == 1 else None
 
 
 @dataclass(frozen=True)

@@ -49,11 +49,15 @@ class Series:
             raise ValueError(f"x {self.x.shape} and values {shapes} must have one shape (n,)")
 
     def text(self, k: int, form: str) -> str:
-        """Return value number `k` as text, with its interval."""
+        """Return value number `k` as text, with its interval unless it is a bound."""
         found = f"{self.name}: {BOUNDS[self.side[k]]}{self.y[k]:{form}}"
-        if np.isfinite(self.low[k]) and np.isfinite(self.high[k]):
+        if self.has_interval(k):
             found += f" ({self.low[k]:{form}} to {self.high[k]:{form}})"
         return found
+
+    def has_interval(self, k: int) -> bool:
+        """Return whether value number `k` has an interval; that of a bound would contradict it."""
+        return not self.side[k] and bool(np.isfinite(self.low[k]) and np.isfinite(self.high[k]))
 
 
 def series(name: str, index: int, rows: Sequence[ArrayLike]) -> Series:
@@ -99,7 +103,7 @@ def draw_marks(
     """
     style, x, most = look(s.index), s.x if x is None else x, reach
     for k in np.flatnonzero(np.isfinite(s.y)).tolist():
-        if bars and np.isfinite(s.low[k]) and np.isfinite(s.high[k]):
+        if bars and s.has_interval(k):
             bar = ax.hlines if across else ax.vlines
             bar(x[k], s.low[k], s.high[k], color=style.colour, lw=1.3, zorder=4,
                 gid=tag(s.index, detail=True))  # fmt: skip

@@ -182,6 +182,7 @@ def _cell_of(column: Column, entry: Entry) -> Cell:
         return cell(None)
     if column is P_VALUE:
         return p_cell(value)
-    around = (column.scale * ends[0], column.scale * ends[1]) if ends else None
+    shown_ends = ends if column.has_range(entry) else None
+    around = (column.scale * shown_ends[0], column.scale * shown_ends[1]) if shown_ends else None
     shown = cell(column.scale * value, column.form, around, column.sign(entry))
     return shown._replace(value=value, ends=ends)

@@ -15,6 +15,8 @@ from poise.training.running.summary import Summary, both_ends
 
 from .cells import number_text
 
+SIDES = {None: "", "lower": "no less than ", "upper": "no more than "}  # of a bound
+
 
 def lead(results: Results) -> list[str]:
     """Return the result in a sentence or three."""
@@ -43,10 +45,11 @@ def lead(results: Results) -> list[str]:
         said = [f"{first} {place}{alone}: it recovers {rate:.1%} of {tried}, and does not fall in "
                 f"{upright:.1%}."]  # fmt: skip
     if "j50_mean" in best:
-        around = both_ends(best["j50_mean_ci95"])
+        bound = best.get("j50_mean_bound")
+        around = None if bound else both_ends(best["j50_mean_ci95"])
         fell = judged_by_falls(summary["controllers"])
         text = f"{'It falls in half' if fell else 'Half'} of its trials"
-        text += f"{'' if fell else ' are recovered'} at {best['j50_mean']:.1f} N·s"
+        text += f"{'' if fell else ' are recovered'} at {SIDES[bound]}{best['j50_mean']:.1f} N·s"
         text += f" (95 % {around[0]:.1f} to {around[1]:.1f})" if around else ""
         text += f": {best['eta_mean']:.2f} of the ankle limit, {best['eta_min']:.2f} in the worst"
         said.append(text + " direction, over all directions.")

@@ -19,6 +19,7 @@ from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit
 from poise.training.benchmarking.trials.trial import Outcome, Trial
+from poise.training.running.columns import J50_KEPT, J50_MEAN
 from poise.training.running.files import plain
 from poise.training.running.summary import Entry, Pair
 from tests.training.benchmarking.evaluation.test_folder import OUTCOME
@@ -185,3 +186,23 @@ def test_feet_and_lean_of_a_robot_that_only_stands(limits: PushLimits) -> None:
     assert entry["foot_drift_max"] == 0.03 and entry["unpushed_lean_max"] == 3.0
     entry = summarise([Trial(0, 0)], {"a": [replace(OUTCOME, final_lean=2.0)]}, limits)[0]["a"]
     assert entry["foot_drift_max"] is None and entry["unpushed_lean_max"] is None
+
+
+def test_a_level_at_which_nothing_is_recovered_has_only_a_bound(limits: PushLimits) -> None:
+    """At most the smallest push, in the terminal too, without an interval or a share that is
+    kept."""
+    impulses = [10.0, 20.0, 30.0, 40.0]
+    aimed = [trial for part in ("envelope", "envelope@field")
+             for trial in trials(limits, impulses, [0.0] * 4, part)]  # fmt: skip
+    quiet = [Trial(9, 9, (), part=part) for part in ("quiet", "quiet@field")]
+    won = outcomes([True, True, False, False, False, False, False, False, True, False])
+    plan = TrialPlan(Suite(quiet=Quiet(), levels=("field",)), limits, 0, ("a",))
+    entry = controller_entry(list(zip([*aimed, *quiet], won, strict=True)), plan)
+    own, field = entry["levels"]
+    assert own["j50_mean_bound"] is None and field["j50_mean_bound"] == "upper"
+    assert (own["j50_bounded"], field["j50_bounded"]) == (0, 1)
+    assert field["j50_kept"] is None and field["j50_kept_ci95"] is None
+    assert J50_MEAN.text(field) == "≤ 10.0" and J50_MEAN.text(own).endswith("]")
+    assert J50_KEPT.text(field) == "–"
+    older = {key: value for key, value in field.items() if key != "j50_mean_bound"}
+    assert J50_MEAN.text(older) == "10.0"  # an interval without a width says nothing

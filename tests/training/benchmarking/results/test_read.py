@@ -125,6 +125,13 @@ def summary(**changes: object) -> Callable[[Path], None]:
     return change
 
 
+def reversed_ranking(folder: Path) -> None:
+    """Turns the ranking around."""
+    data = json.loads((folder / "summary.json").read_text())
+    data["ranking"].reverse()
+    (folder / "summary.json").write_text(json.dumps(data))
+
+
 def cells(**texts: str) -> Callable[[Path], None]:
     """Changes columns of trials.csv, in every line."""
 
@@ -175,6 +182,16 @@ def cells(**texts: str) -> Callable[[Path], None]:
         (edit("settings.yaml", "format: 2", "benchmark: 1"), "is of an older Poise"),
         (edit("summary.json", '"reference": "', '"reference": "other '), "no such controller"),
         (edit("settings.yaml", "seed: 4", "seed: four"), "settings.yaml: seed"),
+        (edit("settings.yaml", "seed: 4", "seed: 5"), "seed: is 4, but settings.yaml has 5"),
+        (summary(recovered_rate=0.99), "recovered_rate: must be recovered over trials, not 0.99"),
+        (summary(recovered_ci95=[2, 3]), "recovered_ci95: must be from 0 to 1, not [2, 3]"),
+        (summary(j50_mean_ci95=[61, 2]), "j50_mean_ci95: must have its lower end first"),
+        (summary(fraction50=-5), "fraction50: must be 0 or more, not -5"),
+        (summary(recovered=1, recovered_rate=1 / 8), "recovered: is 1, but trials.csv has"),
+        (summary(trials=80, recovered=0, recovered_rate=0), "trials: is 80, but trials.csv has 8"),
+        (summary(never_fell_rate=0.99), "never_fell_rate: is 0.99, but trials.csv has"),
+        (edit("summary.json", '"p_mcnemar": ', '"p_mcnemar": -'), "p_mcnemar: must be from 0 to 1"),
+        (reversed_ranking, "ranking: must name the best controller first"),
     ],
 )
 def test_a_folder_that_is_not_whole_is_refused(

@@ -70,6 +70,15 @@ def test_every_packaged_suite_gives_as_many_trials_as_it_says(
     assert build(Suite, to_dict(suite), "again") == suite
 
 
+def test_the_page_says_how_many_trials_a_benchmark_has(limits: PushLimits) -> None:
+    """Of each controller."""
+    counts = {name: TrialPlan(load_suite(name), limits, 0, ["a"]).count
+              for name in ("quick", "standard", "full")}  # fmt: skip
+    page = (Path(__file__).parents[4] / "docs/benchmark.md").read_text()
+    assert ("`quick` has {quick} trials a controller, `standard` {standard}, `full` {full}."
+            ).format(**counts) in page  # fmt: skip
+
+
 def test_random_pushes_are_as_described(limits: PushLimits) -> None:
     """Between 0.5 and 1.6 of the limit, on all of the robot's bodies, in all directions."""
     trials = first(load_suite("random").resized(400), limits, 0)

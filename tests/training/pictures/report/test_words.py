@@ -40,6 +40,19 @@ def test_a_controller_comes_first_where_the_trials_separate_it(pair: Any, place:
     assert said[0].startswith(f"{place}: it ") and "55.0% of 20 random trials" in said[0]
 
 
+@pytest.mark.parametrize(("bound", "says"), [
+    (None, "at 8.1 N·s (95 % 8.1 to 8.1)"), ("upper", "at no more than 8.1 N·s: 0.50"),
+    ("lower", "at no less than 8.1 N·s: 0.50"),
+])  # fmt: skip
+def test_a_bound_is_no_estimate(bound: Any, says: str) -> None:
+    """It has a word before it and no interval."""
+    found = results({"a": 0.0, "b": 0.0}, p_mcnemar=1.0)
+    for entry in found.summary["controllers"].values():
+        entry |= {"j50_mean": 8.1, "j50_mean_ci95": (8.1, 8.1), "j50_mean_bound": bound,
+                  "eta_mean": 0.5, "eta_min": 0.5}  # fmt: skip
+    assert says in lead(found)[1]
+
+
 def test_equal_results_share_the_first_place() -> None:
     """Whatever the pair says."""
     said = lead(results({"a": 0.5, "b": 0.5}, p_mcnemar=1.0))
