@@ -140,7 +140,7 @@ def test_step_time_and_width_are_commanded():
 
 @pytest.mark.parametrize("share, lasts", [(0.2, 0.75), (0.6, 0.5)])
 def test_a_step_time_that_comes_late_in_a_swing_is_that_of_the_next_step(share, lasts):
-    """A robot that is a little late would otherwise take each step of a clip as long as the next."""
+    """Else a robot that is a little late takes each step of a clip as long as the next."""
     _, _, env = walk((4.0, GaitCommand(0.2, step_time=0.5)), seed=4)
     swing, action = env.controller._swing, np.zeros(len(env.action_names))
     memory = env.controller.memory
