@@ -59,6 +59,7 @@ def _ways(free: Retargeted, found: Walked, robot: Robot) -> Iterator[tuple[Robot
     """A walk as it is found and slower, a clip's own steps by a planner for fast walks, too; with
     its arms and, where it has not learned with free ones, without."""
     walk = walked_clip(free.clip, found, robot)
+    assert walk.commands is not None
     fast = found.walker == WALK and not found.bound and robot.name in FAST_ROBOTS
     for arms in (False,) if found.walker == LEARNED else (False, True):
         for walker in (WALK, WALK_FAST) if fast else (found.walker,):
