@@ -165,8 +165,11 @@ LATE = {"magnitude": [1, 2], "unit": "impulse", "start": [0.5, 100]}
         *(
             ({name: {"pushes": {**LATE, **more}}}, rf": {name}.pushes.start: must lie within")
             for name, more in (
-                ("random", {}), ("sustained", {}), ("sequence", {"count": [2, 2]}),
-                ("gusts", {"count": [2, 2]}), ("walk_repeated", {"count": [2, 2]}),
+                ("random", {}),
+                ("sustained", {}),
+                ("sequence", {"count": [2, 2]}),
+                ("gusts", {"count": [2, 2]}),
+                ("walk_repeated", {"count": [2, 2]}),
             )
         ),
         ({"walk_push": {"start": 6.0}}, ": walk_push.start: must lie within the duration, 6 s"),
