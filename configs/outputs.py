@@ -17,7 +17,7 @@ def check_out_folder(out: str | Path, field: str = "out") -> None:
         ConfigError: it is a file, or no file can have this name.
         WriteError: nothing may be written there.
     """
-    whole_path(out, field=field)
+    _check_named(out, field)
     if exists(out) and not is_folder(out):
         raise ConfigError("is not a folder", source=out, field=field)
     _check_place(out, Path(out))
@@ -28,10 +28,16 @@ def check_out_file(out: str | Path, field: str = "out") -> None:
 
     Raises ConfigError and WriteError as `check_out_folder`, ConfigError for a folder.
     """
-    whole_path(out, field=field)
+    _check_named(out, field)
     if is_folder(out):
         raise ConfigError("is a folder: name a file", source=out, field=field)
     _check_place(out, Path(out).parent)
+
+
+def _check_named(out: str | Path, field: str) -> None:
+    if not str(out):
+        raise ConfigError("must not be empty", field=field)
+    whole_path(out, field=field)
 
 
 def _check_place(out: str | Path, folder: Path) -> None:

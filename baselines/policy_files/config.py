@@ -12,6 +12,7 @@ from .motion.config import MotionConfig
 PerJoint = float | tuple[float, ...] | dict[str, float]
 
 SCALES = {"min": -1e3, "max": 1e3}  # of an action, in rad
+GAINS = {"min": 0.0, "max": 1e6}
 
 #: what an output may be: the action, and gains that come with it
 ROLES = ("action", "stiffness", "damping")
@@ -92,9 +93,9 @@ class Held:
         damping: D [N·m·s/rad].
     """
 
-    position: float | None = None
-    stiffness: float | None = field(default=None, metadata={"min": 0.0})
-    damping: float | None = field(default=None, metadata={"min": 0.0})
+    position: float | None = field(default=None, metadata=SCALES)
+    stiffness: float | None = field(default=None, metadata=GAINS)
+    damping: float | None = field(default=None, metadata=GAINS)
 
 
 @dataclass(frozen=True)
@@ -235,12 +236,12 @@ class PolicyFileConfig:
     deploy: str | None = None
     joints: tuple[str, ...] = ()
     motors: tuple[int, ...] = field(default=(), metadata={"min": 0})
-    default: PerJoint = 0.0
-    stiffness: PerJoint = field(default=40.0, metadata={"min": 0.0})
-    damping: PerJoint = field(default=1.0, metadata={"min": 0.0})
+    default: PerJoint = field(default=0.0, metadata=SCALES)
+    stiffness: PerJoint = field(default=40.0, metadata=GAINS)
+    damping: PerJoint = field(default=1.0, metadata=GAINS)
     action_joints: tuple[int, ...] = field(default=(), metadata={"min": 0})
     action_scale: float | tuple[float, ...] = field(default=0.25, metadata=SCALES)
-    action_offset: PerJoint | None = None
+    action_offset: PerJoint | None = field(default=None, metadata=SCALES)
     action_clip: tuple[tuple[float, float], ...] = ()
     observations: tuple[ObservationTerm, ...] | dict[str, tuple[ObservationTerm, ...]] = ()
     history: Literal["term", "frame"] = "term"
@@ -255,7 +256,7 @@ class PolicyFileConfig:
     )
     origin: Origin | None = field(default=None, metadata={"omit": "default"}, compare=False)
     held: tuple[float, ...] | dict[str, float | Held] | None = field(
-        default=None, metadata={"omit": "default"}
+        default=None, metadata={"omit": "default", **SCALES}
     )
     law: dict[str, JointLaw] = field(default_factory=dict, metadata={"omit": "default"})
     outputs: dict[str, str | int] = field(default_factory=dict, metadata={"omit": "default"})

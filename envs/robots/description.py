@@ -61,7 +61,7 @@ class PostureDescription:
 class OptionDescription:
     """Simulation options that replace those of the model; None: the model's own."""
 
-    timestep: float = field(default=0.002, metadata={"above": 0.0, "max": 0.01})  #: [s]
+    timestep: float = field(default=0.002, metadata={"min": 1e-4, "max": 0.01})  #: [s]
     integrator: Literal["implicitfast", "implicit", "Euler"] = "implicitfast"  #: MuJoCo's
     solver: Literal["Newton", "CG", "PGS"] = "Newton"  #: MuJoCo's, of constraints
     #: sliding friction coefficient of every geom
@@ -93,7 +93,9 @@ class RobotDescription:
     roles: dict[str, dict[str, float]] = field(default_factory=dict)
     #: joint name or pattern → largest torque [N·m]. Needed where the model's actuators do not bound
     #: it; wins over the model's own limits, and gives a motor to a joint that has none
-    torque_limits: dict[str, float] = field(default_factory=dict, metadata={"above": 0.0})
+    torque_limits: dict[str, float] = field(
+        default_factory=dict, metadata={"above": 0.0, "max": 1e6}
+    )
     #: joint name or pattern → inertia of the rotor as the joint feels it, times gear² [kg·m²; of a
     #: slide kg]; wins over the model's. URDF files cannot say it
     armature: dict[str, float] = field(default_factory=dict, metadata=PASSIVE)

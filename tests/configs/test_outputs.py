@@ -36,6 +36,8 @@ def test_the_wrong_kind(tmp_path: Path) -> None:
         assert (caught.value.path, caught.value.reason) == (str(file / "a/b"), "Not a directory")
         with invalid("out", r"'a\x00b'"):
             check("a\0b")
+        with invalid("out", "must not be empty"):
+            check("")
 
 
 def test_where_nothing_may_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

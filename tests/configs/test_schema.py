@@ -484,3 +484,22 @@ def test_whole_numbers_of_too_many_digits() -> None:
         with pytest.raises(ConfigError, match=f"{name}: must be a finite number"):
             build(Counted, {name: 10**400}, "test")
     assert build(Counted, {"count": 10**300}, "test").count == 10**300
+
+
+@dataclass(frozen=True)
+class Unfit:
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        raise ConfigError("does not fit", field="size", choices=["1", "2"])
+
+
+@dataclass(frozen=True)
+class OfUnfit:
+    part: Unfit
+
+
+def test_an_error_of_a_part_names_file_and_field() -> None:
+    """Also one that a part raises about a field of its own, which knows neither."""
+    with pytest.raises(ConfigError, match=r"^test: part\.size: does not fit \(choices: 1, 2\)"):
+        build(OfUnfit, {"part": {}}, "test")

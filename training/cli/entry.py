@@ -15,7 +15,7 @@ import poise
 from poise.baselines.extras import load_extra
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
 from poise.configs.problems import Problem
-from poise.training.running.options.arguments import check_flags
+from poise.training.running.options.arguments import check_flags, check_out
 from poise.training.running.options.pages import print_commands
 from poise.training.running.options.parsing import answered
 from poise.training.running.options.spelling import respelled, suggestion
@@ -132,6 +132,7 @@ def _run(args: list[str]) -> int:
     if name not in COMMANDS:
         hint = meant(name, COMMANDS)
         raise Problem("unknown command", None, None, COMMANDS, value=shown(name), hint=hint)
+    check_out(given)
     if name == "train":  # its flags are the fields of a heavy dataclass
         check_flags(given, {"--config": "training", "--robot": "robots"})
         from .train import run_train

@@ -20,7 +20,7 @@ from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
 from poise.baselines.registry import controller_config
 from poise.configs.archives import Archive, read_archive, read_arrays
 from poise.configs.errors import ConfigError, shown
-from poise.configs.reading import is_file, parsing, read_json
+from poise.configs.reading import is_file, read_json
 from poise.configs.schema import to_yaml
 
 from .config import TrainConfig
@@ -172,8 +172,11 @@ def _member(archive: Archive, path: Path, part: str) -> Any:
 
     data = archive.read(f"{part}.pth")
     Archive(data, f"{path}: {part}.pth")  # torch's own format is a zip file too
-    with parsing(path):
+    try:
         value = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
+    except Exception as error:  # torch's text advises to unpickle it nevertheless
+        why = f"{part}.pth must hold tensors and nothing that is run ({type(error).__name__})"
+        raise ConfigError(f"cannot be read: {why}", source=path) from None
     for tensor in _tensors(value, path):
         if tensor.dtype not in (torch.float32, torch.float64) or tensor.layout is not torch.strided:
             raise ConfigError(f"holds weights of {tensor.dtype}: they must be 32- or 64-bit floats",

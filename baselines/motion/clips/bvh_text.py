@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, one_line, shown
 from poise.configs.reading import MIB, read_bytes
 
 BVH_BYTES = 64 * MIB
@@ -200,10 +200,11 @@ class _Head:
     def _frames(self, number: int, words: list[str]) -> None:
         if len(words) != 2 or not words[1].isascii() or not words[1].isdigit():
             self.fail(number, "'Frames:' must be followed by their number")
-        self.frames = int(words[1][:12])
+        self.frames = int(words[1]) if len(words[1]) <= 12 else 10**12  # more than can be read
         if not 1 < self.frames <= MOST_VALUES // max(self.channels, 1):
-            self.fail(number, f"{self.frames} frames of {self.channels} values: at least 2 frames "
-                      f"and at most {MOST_VALUES} values can be read")  # fmt: skip
+            frames = f"{one_line(words[1], 40)} frames of {self.channels} values"
+            self.fail(number, f"{frames}: at least 2 frames and at most {MOST_VALUES} values can "
+                      "be read")  # fmt: skip
 
     def _time(self, number: int, words: list[str]) -> bool:
         (dt,) = self._numbers(number, words[2:], 1)

@@ -139,12 +139,12 @@ def _check_keys(data: Mapping, known: tuple[str, ...], source: str) -> None:
             raise ConfigError("unknown key", source=source, field=str(key), choices=known)
 
 
-def check_body(body: str, robot: Robot, source: str) -> None:
+def check_body(body: str, robot: Robot, source: str | None, field: str = "body") -> None:
     """Raise ConfigError, listing the robot's bodies, unless `body` is one of them."""
     if body not in body_names(robot):
         raise ConfigError(
             f"no body {shown(body)} in robot {robot.name!r}",
             source=source,
-            field="body",
+            field=field,
             choices=body_names(robot),
         )

@@ -156,7 +156,7 @@ class PushSampler:
             one = replace(self, others=()) if chosen == 0 else self.others[chosen - 1]
             return one.sample(rng, robot, margin, limits)
         for body in self.bodies:
-            check_body(body, robot, "bodies")
+            check_body(body, robot, None, "bodies")
         quiet = rng.random() < self.no_push
         count = int(rng.integers(self.count[0], self.count[1], endpoint=True))
         pushes = []

@@ -321,6 +321,17 @@ BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "an input without terms": (lambda f: bare(f, observations={"obs": []}),
                                ("own.yaml: observations: what the policy sees is not said",)),
     "names that are no list": (metadata(dof_names="[1,"), ("dof_names: is no list in JSON",)),
+    **{
+        f"a huge {name}": (lambda f, said={name: value}: bare(f, **said),
+                           (f"own.yaml: {field}: must be at most {most}",))
+        for name, value, field, most in (
+            ("stiffness", 1e300, "stiffness", "1000000"),
+            ("damping", [1e300], "damping[0]", "1000000"),
+            ("action_offset", 1e300, "action_offset", "1000"),
+            ("default", 1e300, "default", "1000"),
+            ("held", {"waist": {"stiffness": 1e7}}, "held.waist.stiffness", "1000000"),
+        )
+    },
     "no such deploy": (lambda f: bare(f, deploy="lost.yaml"), ("lost.yaml: cannot be read",)),
     "deploy of nobody": (lambda f: bare(f, deploy="own.yaml"), ("is no configuration of unitree",)),
     "short posture": (deploy(default_joint_pos=[0.0]),

@@ -51,6 +51,9 @@ def test_folders(command: str, cold: Path, capsys: pytest.CaptureFixture[str]) -
         command == "demo --full"  # which has folders in it
     )
     assert "cannot be written (Not a directory)" in refused(f"{command} --out file/a", capsys)
+    for empty in (["--out="], ["--out", ""]):  # a variable that is not set
+        assert main([*command.split(), *empty]) == 2
+        assert capsys.readouterr().err == "poise: out: must not be empty\n"
     assert sorted(path.name for path in cold.iterdir()) == ["file", "folder.mp4"]
 
 

@@ -375,7 +375,7 @@ def test_loading_executes_nothing(folder, tmp_path, model, member, reader):
         else:
             restore(folder, model, model.get_env(), robot().fingerprint)
     except ConfigError as error:
-        assert str(folder) in str(error)
+        assert str(folder) in str(error) and "weights_only" not in str(error)
     assert not mark.exists()
     pickle.loads(pickled)  # the bomb is a real one
     assert mark.exists()

@@ -16,7 +16,8 @@ from rich.console import Console
 
 from poise.baselines.allowance import allowing
 from poise.baselines.warmup import prepare
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, naming, shown
+from poise.configs.files import resolve
 from poise.configs.outputs import check_out_folder
 from poise.configs.problems import out_of_range
 from poise.configs.schema import to_dict
@@ -99,8 +100,10 @@ class Run:
         if physics is not None:
             self.suite = replace(self.suite, physics=physics)
         engine = load_physics(self.suite.physics)
-        for level in (self.suite.realism, *self.suite.levels):
-            load_realism(level)
+        file = resolve("suites", suite)
+        with naming(None if realism else file):
+            for level in (self.suite.realism, *self.suite.levels):
+                load_realism(level)
         self.out, self.overwrite, self.executor = Path(out), overwrite, Executor(backend, workers)
         check_out_folder(out)
         self.robot = load_robot(robot)
@@ -116,7 +119,8 @@ class Run:
         check_folder(self.out, known, overwrite)
         self.limits, self.reference = measured(self.robot), reference
         self.repertoire = suite_repertoire(self.suite, self.robot, self.out, overwrite)
-        plan = self._plan(seed, names)  # refuses what does not fit the robot
+        with naming(file):
+            plan = self._plan(seed, names)  # refuses what does not fit the robot
         _check_engine(engine, self.robot, plan)
         if self.suite.walks:
             for name in names:

@@ -60,6 +60,13 @@ def check_folders(*paths: str | Path) -> None:
             raise ConfigError("no such folder", source=path)
 
 
+def check_out(args: Sequence[str]) -> None:
+    """Raise ConfigError for an empty ``--out``, of an unset variable: parsed, it would be the
+    working folder."""
+    if "--out=" in args or ("--out", "") in pairwise(args):
+        raise ConfigError("must not be empty", field="out")
+
+
 def check_flags(args: Sequence[str], kinds: Mapping[str, str]) -> None:
     """Raise ConfigError for an unknown name after a flag, before a command's slow parsing.
 

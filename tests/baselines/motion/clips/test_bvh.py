@@ -127,6 +127,7 @@ FAULTS = {
     "JOINT LeftLeg": ("JOINT Hips", "line 10: a second joint is called 'Hips'"),
     "Frames: 12": ("Frames: 13", "line 59: the file ends after 12 rows, 'Frames:' says 13"),
     "Frames: 12\n": ("Frames: 10000000000\n", "line 46: 10000000000 frames"),
+    "MOTION\nFrames: 12": ("MOTION\nFrames: 1" + 30 * "0", f"line 46: 1{30 * '0'} frames"),
     "Frame Time: 0.033333": ("Frame Time: 0", "line 47: a frame time must be"),
     "0.950000 0.000000 0.000000": ("0.950000 0.000000", "line 48: 23 values instead of 24"),
     "0.949000": ("inf", "line 49: 'inf' is no number"),

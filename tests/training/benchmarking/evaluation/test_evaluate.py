@@ -43,6 +43,26 @@ def lines(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+PUSHES = {"magnitude": [1.0, 1.0], "unit": "impulse"}
+
+
+@pytest.mark.parametrize(
+    ("fields", "field"),
+    [
+        ({"levels": ["nowhere.yaml"], "quiet": {}}, "realism"),
+        ({"random": {"trials": 1, "pushes": {**PUSHES, "bodies": ["tail"]}}}, "bodies"),
+        ({"random": {"trials": 1, "pushes": {**PUSHES, "magnitude": [1e15, 1e15]}}}, "impulse"),
+    ],
+)
+def test_what_does_not_fit_names_the_suites_file(
+    tmp_path: Path, fields: dict[str, Any], field: str
+) -> None:
+    """Also where the robot, or what is drawn, shows it."""
+    suite = write_suite(tmp_path, fields)
+    with invalid(field, source=str(suite)):
+        evaluate(["zero"], suite, out=tmp_path / "out")
+
+
 @pytest.mark.weekly
 def test_results_do_not_depend_on_the_number_of_workers(
     tmp_path: Path, in_process: type[InProcess], monkeypatch: pytest.MonkeyPatch
