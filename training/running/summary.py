@@ -177,7 +177,8 @@ class Entry(Counts, EnvelopeFigures, Fractions, total=False):
     """A controller.
 
     The counts are of the rated part, else of all trials; of pushed walks, of those common to all
-    controllers. `evaluated` counts all trials, `errors` those in which the controller raised.
+    controllers. `evaluated` counts all trials, `errors` those in which the controller raised,
+    `fell_before_push` those that ended before the first push, if any.
     `losses` lists the causes, the most frequent first. J50, ranking, pairs and losses use the
     `criterion`; older results, which lack it, use "recovered". `stand_ins` counts the trials in
     which another controller ran in place of the named one, see its `uncertain`.
@@ -185,6 +186,7 @@ class Entry(Counts, EnvelopeFigures, Fractions, total=False):
 
     evaluated: Required[int]
     errors: Required[int]
+    fell_before_push: int
     criterion: Criterion
     losses: list[Loss]
     tick_us: Number

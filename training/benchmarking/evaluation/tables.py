@@ -43,6 +43,8 @@ from .walk_tables import lasting_tables, level_tables, motion_tables, scenario_t
 
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
 SEPARATED = 0.05  # p below which the trials separate two controllers
+EARLY = "{} fell before the push in {} of {} trials, which count as lost"
+NOT_CORRECTED = "; p is not corrected for their number"  # of several pairs
 SHOWN = 5  # lost trials of a controller that are listed
 IN_PAIRS = (LOST_WON.heading, P_VALUE.heading)  # headings whose figures the table of pairs has
 
@@ -155,8 +157,13 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]
     if p_values:
         close = sum(p >= SEPARATED for p in p_values)
-        notes.append(f"{P_VALUE.heading} ≥ {SEPARATED:g}: these trials do not separate the two"
-                     f" ({close} of {len(p_values)} pairs)")  # fmt: skip
+        notes.append(
+            f"{P_VALUE.heading} ≥ {SEPARATED:g}: these trials do not separate the two"
+            f" ({close} of {len(p_values)} pairs{NOT_CORRECTED * (len(p_values) > 1)})"
+        )
+    for name, entry in summary["controllers"].items():
+        if early := entry.get("fell_before_push"):
+            notes.append(EARLY.format(name, early, entry["evaluated"]))
     return [*notes, *stand_in_notes(summary)]
 
 

@@ -64,6 +64,9 @@ def controller_entry(
         "evaluated": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
+    starts = [(t.push.start, o.fall_time) for t, o in everything if t.push is not None]
+    if early := sum(fall is not None and fall < start for start, fall in starts):
+        entry["fell_before_push"] = early
     stepping = any(outcome.steps for _, outcome in everything)
     if found := losses(((o, o.steps) for t, o in evaluated if not is_won(t, o)), stepping):
         entry["losses"] = found

@@ -63,6 +63,11 @@ class Record:
         return not self.fallen and not self.error
 
     @property
+    def fell_first(self) -> bool:
+        """Whether it fell before the first push."""
+        return self.start is not None and self.fall_time < self.start
+
+    @property
     def won(self) -> bool:
         """What J50, rankings and pairs count, see `training/benchmarking/trials/trial.py`."""
         return self.upright if self.judged_by_falls else self.recovered

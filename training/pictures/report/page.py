@@ -107,7 +107,8 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
     trials = _file(results, TRIALS, TABLE_BYTES)
     return render_page("report.html.j2",
         summary=results.summary,
-        trial_count=len({record.trial for record in results.records}),
+        trials_met=words.trials_met(results),
+        early_falls=words.early_fall_notes(results),
         controllers=[
             {"name": name, "index": results.controllers.index(name),
              "swatch": plots.swatch(results.controllers.index(name))}
@@ -233,7 +234,8 @@ def _ending(record: Record) -> str:
     if record.recovered:
         return "recovered"
     if record.fallen:
-        return f"fell after {record.fall_time:.2f} s"
+        early = ", before the push" if record.fell_first else ""
+        return f"fell after {record.fall_time:.2f} s{early}"
     return "upright, not as commanded" if record.line.get("commands") else "stood, but not quiet"
 
 

@@ -3,7 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from poise.training.benchmarking.evaluation.tables import judged_by_falls, shared_ranks
+from poise.training.benchmarking.evaluation.tables import (
+    NOT_CORRECTED,
+    judged_by_falls,
+    shared_ranks,
+)
 from poise.training.benchmarking.results.read import Results
 from poise.training.running.columns import (
     AGAINST,
@@ -83,7 +87,9 @@ def ranking(results: Results, baseline: str) -> Table | None:
 def paired_rows(results: Results) -> Table | None:
     """Return every pair of controllers on the same trials; None of one alone."""
     columns = (*PAIR, *PAIRED, P_VALUE, GAIN)
-    return entry_table("pairs", "All pairs on the same trials.", columns, results.summary["pairs"])
+    pairs = results.summary["pairs"]
+    caption = f"All pairs on the same trials{NOT_CORRECTED * (len(pairs) > 1)}."
+    return entry_table("pairs", caption, columns, pairs)
 
 
 def directions(results: Results) -> Table | None:

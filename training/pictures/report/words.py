@@ -4,6 +4,7 @@ import math
 
 from poise.training.benchmarking.diagnosis.words import towards
 from poise.training.benchmarking.evaluation.tables import (
+    EARLY,
     SEPARATED,
     assisted,
     judged_by_falls,
@@ -54,6 +55,24 @@ def lead(results: Results) -> list[str]:
         text += f": {best['eta_mean']:.2f} of the ankle limit, {best['eta_min']:.2f} in the worst"
         said.append(text + " direction, over all directions.")
     return said
+
+
+def trials_met(results: Results) -> str:
+    """Return how many trials each controller has, and how many of them are common to all: second
+    stages differ, and pairs leave them out."""
+    own = [{record.met for record in results.of(name)} for name in results.controllers]
+    common, sizes = len(set.intersection(*own)), sorted({len(met) for met in own})
+    if len(own) > 1 and sizes == [common]:
+        return f"on the same {common} trials"
+    each = " to ".join(str(size) for size in dict.fromkeys((sizes[0], sizes[-1])))
+    return f"with {each} trials" + (f" each, {common} of them common to all" if own[1:] else "")
+
+
+def early_fall_notes(results: Results) -> list[str]:
+    """Return a line for each controller that fell before pushes."""
+    found = {name: results.of(name) for name in results.summary["ranking"]}
+    counts = {name: sum(record.fell_first for record in own) for name, own in found.items()}
+    return [EARLY.format(name, n, len(found[name])) for name, n in counts.items() if n]
 
 
 def _not_separated(summary: Summary, first: str, second: str) -> str:

@@ -97,6 +97,14 @@ def test_the_words_of_a_table_are_explained_below_it() -> None:
     text = printed(summary)
     line = f"McNemar p ≥ 0.05: these trials do not separate the two ({len(pairs) - below} of "
     assert line in text and "steps, mean: of all trials" in text
+    assert f"of {len(pairs)} pairs; p is not corrected for their number)" in text
+    one = printed({**summary, "pairs": summary["pairs"][:1]})
+    assert "of 1 pairs)" in one and "fell before the push" not in one
+    first = summary["ranking"][0]
+    summary["controllers"][first]["fell_before_push"] = 3
+    count = summary["controllers"][first]["evaluated"]
+    told = f"{first} fell before the push in 3 of {count} trials, which count as lost"
+    assert told in printed(summary, 200)
     assert "half of the pushes" not in text
     failures = sum(each["solver_failures_recovered"] for each in summary["controllers"].values())
     assert f"were falling; {failures} in trials that were recovered" in text

@@ -206,3 +206,12 @@ def test_a_level_at_which_nothing_is_recovered_has_only_a_bound(limits: PushLimi
     assert J50_KEPT.text(field) == "–"
     older = {key: value for key, value in field.items() if key != "j50_mean_bound"}
     assert J50_MEAN.text(older) == "10.0"  # an interval without a width says nothing
+
+
+def test_falls_before_the_push_are_counted(limits: PushLimits) -> None:
+    """The push is at 0.5 s; without any there is no count."""
+    some = trials(limits, [10.0, 20.0, 30.0], [0.0] * 3)
+    fell = [replace(each, fall_time=t) for each, t in zip(outcomes([False] * 3), (0.08, 0.5, 0.49),
+                                                          strict=True)]  # fmt: skip
+    entries, _ = summarise(some, {"a": fell, "b": outcomes([True] * 3)}, limits)
+    assert entries["a"]["fell_before_push"] == 2 and "fell_before_push" not in entries["b"]

@@ -20,6 +20,7 @@ from poise.training.benchmarking.results.read import load_results
 from poise.training.cli.entry import main
 from poise.training.pictures.report import page as html_report
 from poise.training.pictures.report.page import write_report
+from poise.training.running.files import csv_text
 from tests.support.browser import CHROMIUM, Browser
 from tests.support.report_folders import SOFT, copied, finished
 from tests.support.weekly import daily
@@ -84,6 +85,32 @@ def test_the_page_stands_alone(report: Path) -> None:
     assert all(a.get("aria-label") or a.get("aria-hidden") == "true" for a in page.all("svg"))
     assert all("scope" in attributes for attributes in page.all("th"))
     assert report.stat().st_size < 1_500_000
+
+
+def test_the_headline_counts_common_trials(report: Path) -> None:
+    """Those of an envelope's second stage are each controller's own; p of one pair needs no
+    correction."""
+    text = report.read_text()
+    results = load_results(finished(report.stem))
+    one, two = ({record.met for record in results.of(name)} for name in results.controllers)
+    same = f"on the same {len(one)} trials."
+    told = same if one == two else f"with {len(one)} trials each, {len(one & two)} of them common"
+    assert f"2 controllers {told}" in text and (one == two) is (report.stem == "random")
+    assert "not corrected" not in text and "fell before the push" not in text
+
+
+def test_falls_before_the_push_are_no_silent_losses(tmp_path: Path) -> None:
+    """A line says how many, and the trial says so too."""
+    folder = copied("random", tmp_path)
+    lines = list(csv.DictReader(io.StringIO((folder / "trials.csv").read_text())))
+    fallen = [line for line in lines if line["fall_time"]]
+    for line in fallen:
+        line["start"] = str(float(line["fall_time"]) + 0.1)
+    (folder / "trials.csv").write_text(csv_text(lines, list(lines[0])))
+    text = write_report(folder, films=False).read_text()
+    count = sum(line["controller"] == "zero" for line in fallen)
+    assert f"zero fell before the push in {count} of 8 trials, which count as lost." in text
+    assert " s, before the push</span>" in text
 
 
 def test_names_are_escaped(report: Path) -> None:

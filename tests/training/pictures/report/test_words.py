@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from poise.training.pictures.report.words import lead
+from poise.training.pictures.report.words import early_fall_notes, lead, trials_met
 
 
 def results(rates: dict[str, float], **pair: Any) -> Any:
@@ -57,3 +57,30 @@ def test_equal_results_share_the_first_place() -> None:
     """Whatever the pair says."""
     said = lead(results({"a": 0.5, "b": 0.5}, p_mcnemar=1.0))
     assert said[0].startswith("a ties with b for the first place: ")
+
+
+def met(**trials: list[str]) -> Any:
+    """The results of controllers with these trials, of which those that begin with "early" are
+    over before the push."""
+    found = {name: [SimpleNamespace(met=(each,), fell_first=each.startswith("early"))
+                    for each in own] for name, own in trials.items()}  # fmt: skip
+    return SimpleNamespace(controllers=tuple(found), of=found.get, summary={"ranking": [*found]})
+
+
+@pytest.mark.parametrize(("trials", "says"), [
+    ({"a": ["1", "2"]}, "with 2 trials"),
+    ({"a": ["1", "2"], "b": ["2", "1"]}, "on the same 2 trials"),
+    ({"a": ["1", "2"], "b": ["1", "3"]}, "with 2 trials each, 1 of them common to all"),
+    ({"a": ["1", "2"], "b": ["1"]}, "with 1 to 2 trials each, 1 of them common to all"),
+])  # fmt: skip
+def test_common_trials_are_counted(trials: dict[str, list[str]], says: str) -> None:
+    """A second stage has other pushes for each controller."""
+    assert trials_met(met(**trials)) == says
+
+
+def test_falls_before_the_push_are_said() -> None:
+    """Of those controllers that have any."""
+    found = met(a=["1", "2"], b=["1", "early 2", "early 3"])
+    assert early_fall_notes(found) == [
+        "b fell before the push in 2 of 3 trials, which count as lost"
+    ]
