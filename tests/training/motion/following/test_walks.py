@@ -73,7 +73,7 @@ def test_steps_are_the_clip_s_where_legs_can() -> None:
     free = retarget_freely(clip, robot)
     found = find_commands(clip, robot, free.scale)
     lasts = np.diff(found.commands[1:, 0])
-    assert found.commands[1:-1, 4] + 0.037 - 0.02 == pytest.approx(lasts, abs=0.002)
+    assert found.commands[1:-1, 4] + 0.037 - 0.005 == pytest.approx(lasts, abs=0.002)
     length = found.commands[1:-1, 1] * lasts
     assert length.max() == pytest.approx(0.6 * robot.height_com, rel=0.03)
     walks = walked_clip(free.clip, found, robot)
