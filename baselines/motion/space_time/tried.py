@@ -61,12 +61,13 @@ def _ways(free: Retargeted, found: Walked, robot: Robot) -> Iterator[tuple[Robot
     walk = walked_clip(free.clip, found, robot)
     assert walk.commands is not None
     fast = found.walker == WALK and not found.bound and robot.name in FAST_ROBOTS
+    slowest = min(ENOUGH / (found.way * found.tempo), 1.0)
+    paces = [*(pace for pace in SLOWER if pace > slowest), slowest]
     for arms in (False,) if found.walker == LEARNED else (False, True):
         for walker in (WALK, WALK_FAST) if fast else (found.walker,):
-            for pace in SLOWER:
-                if found.way * found.tempo * pace >= ENOUGH:
-                    yield (
-                        replace(walk, about=replace(walk.about, free_arms=arms), dt=walk.dt / pace,
-                                commands=faster(walk.commands, pace)),
-                        found._replace(tempo=pace * found.tempo, walker=walker),
-                    )  # fmt: skip
+            for pace in paces:
+                yield (
+                    replace(walk, about=replace(walk.about, free_arms=arms), dt=walk.dt / pace,
+                            commands=faster(walk.commands, pace)),
+                    found._replace(tempo=pace * found.tempo, walker=walker),
+                )  # fmt: skip
