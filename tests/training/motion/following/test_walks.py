@@ -77,8 +77,9 @@ def test_steps_are_the_clip_s_where_legs_can() -> None:
     length = found.commands[1:-1, 1] * lasts
     assert length.max() == pytest.approx(0.6 * robot.height_com, rel=0.03)
     walks = walked_clip(free.clip, found, robot)
-    (trial,) = follow(reference_from(walks, robot, "walk"), found.walker, starts=1)
-    assert not trial.fallen and trial.footsteps_kept >= 0.9 and abs(trial.footstep_delay) < 0.1
+    trials = follow(reference_from(walks, robot, "walk"), found.walker, starts=3)
+    assert not any(trial.fallen or abs(trial.footstep_delay) > 0.02 for trial in trials)
+    assert np.mean([trial.footsteps_kept for trial in trials]) >= 0.9
 
 
 def test_footsteps_are_the_clip_s_though_soles_turn_on_the_ground() -> None:
