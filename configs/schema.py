@@ -236,9 +236,9 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
     except ConfigError as error:
         if error.source is not None:
             raise
-        field = f"{prefix}{error.field}" if error.field else path or None
+        place = f"{prefix}{error.field}" if error.field else path or None
         raise ConfigError(
-            error.message, source=source, field=field, choices=error.choices
+            error.message, source=source, field=place, choices=error.choices
         ) from error
     except ValueError as error:
         raise ConfigError(str(error), source=source, field=path or None) from error
