@@ -12,9 +12,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.baselines import ResidualStepEnv
 from poise.envs import replicate
-from poise.training import ThreadedVecEnv
-from poise.training.learning.symmetry import MirroredMeanStd, MirroredPolicy
-from poise.training.learning.train import slow_actor
+from poise.training import MirroredMeanStd, MirroredPolicy, ThreadedVecEnv, slow_actor
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 500_000
 n = min(max(steps // 96, 2), 128)  # environments

@@ -11,6 +11,8 @@ __all__ = [
     "LowCmdBridge",
     "LowCmdRobot",
     "Measurement",
+    "MirroredMeanStd",
+    "MirroredPolicy",
     "MotorCommand",
     "Policy",
     "Readings",
@@ -28,6 +30,7 @@ __all__ = [
     "load_standalone",
     "record",
     "replay",
+    "slow_actor",
     "train",
     "train_config",
     "train_seeds",
@@ -51,7 +54,8 @@ if TYPE_CHECKING:
     from poise.training.learning.config import TrainConfig, train_config
     from poise.training.learning.policy import Policy, load_policy
     from poise.training.learning.seeds.train import train_seeds
-    from poise.training.learning.train import train
+    from poise.training.learning.symmetry import MirroredMeanStd, MirroredPolicy
+    from poise.training.learning.train import slow_actor, train
     from poise.training.learning.tuning.search import tune
     from poise.training.learning.vec_env import ThreadedVecEnv
     from poise.training.pictures.figures.video import frame_strip, record
