@@ -227,7 +227,7 @@ def _check_rate(folder: Path, name: str, entry: Entry, records: Sequence[Record]
         "never_fell_rate": sum(r.upright for r in own) / max(len(own), 1),
     }
     for key, found in counted.items():
-        told = cast("float | None", entry.get(key))  # older results lack some
-        if told is not None and abs(told - found) > MARGIN:
-            why = f"is {told:.6g}, but {TRIALS} has {found:.6g}"
+        written = cast("float | None", entry.get(key))  # older results lack some
+        if written is not None and abs(written - found) > MARGIN:
+            why = f"is {written:.6g}, but {TRIALS} has {found:.6g}"
             raise ConfigError(why, source=folder / SUMMARY, field=f"controllers.{name}.{key}")
