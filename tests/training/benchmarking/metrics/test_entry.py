@@ -215,3 +215,15 @@ def test_falls_before_the_push_are_counted(limits: PushLimits) -> None:
                                                           strict=True)]  # fmt: skip
     entries, _ = summarise(some, {"a": fell, "b": outcomes([True] * 3)}, limits)
     assert entries["a"]["fell_before_push"] == 2 and "fell_before_push" not in entries["b"]
+
+
+def test_a_level_keeps_a_share_of_an_estimate(limits: PushLimits) -> None:
+    """The ratio of the two J50s where neither is a bound."""
+    aimed = [trial for part in ("envelope", "envelope@field")
+             for trial in trials(limits, [10.0, 20.0, 30.0, 40.0], [0.0] * 4, part)]  # fmt: skip
+    quiet = [Trial(9, 9, (), part=part) for part in ("quiet", "quiet@field")]
+    won = outcomes([True, True, True, False, True, True, False, False, True, True])
+    plan = TrialPlan(Suite(quiet=Quiet(), levels=("field",)), limits, 0, ("a",))
+    own, field = controller_entry(list(zip([*aimed, *quiet], won, strict=True)), plan)["levels"]
+    assert field["j50_kept"] == pytest.approx(field["j50_mean"] / own["j50_mean"])
+    assert field["j50_kept"] < 0.8 and field["j50_kept_ci95"] is not None
