@@ -1,4 +1,4 @@
-"""Stable-Baselines3's PPO with the numbers of `poise train --quick`.
+"""Stable-Baselines3's PPO with nearly the numbers of `poise train --quick`.
 
 python examples/sb3_train.py [STEPS]
 """
