@@ -60,7 +60,6 @@ def start_walking(t: WalkTick) -> None:
     m.foot, m.recovering, m.corners = 1 - first, 1, 0
     g.walking, g.starting, g.clock, g.step_clock = 1, 1, 0.0, -1.0
     g.caught = 0
-    g.asked_step_time = g.commanded_step_time
     for a in range(3):
         g.velocity[a] = 0.0
     g.error[0] = g.error[1] = 0.0

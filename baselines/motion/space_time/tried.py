@@ -36,15 +36,8 @@ def held_walk(
     in which none fails and 0.9 of the clip's own steps are taken is the way. The planner's are
     taken only where the robot falls with the clip's, or takes less than 0.75 of these.
     """
-    ways = list(_ways(free, found, robot))
-    most, best = (False, Rehearsed(0.0, 0.0)), ways[0]
-    try:
-        others = find_commands(clip, robot, free.scale, ENOUGH, own=False)
-    except ConfigError:  # at the clip's whole way its speed may change too soon
-        others = found
-    if not np.array_equal(others.commands, found.commands):
-        ways += _ways(free, others, robot)
-    for walk, way in ways:
+    most, best = (False, Rehearsed(0.0, 0.0)), (walked_clip(free.clip, found, robot), found)
+    for walk, way in _all_ways(clip, found, free, robot):
         trial = holds(walk, way.walker)
         stands = trial.share >= 1.0
         rank = (stands and (way.bound != "" or trial.kept >= LEAST), trial)
@@ -53,6 +46,19 @@ def held_walk(
         if stands and (way.bound or trial.kept >= KEPT):
             break
     return *best, most[1].share >= 1.0
+
+
+def _all_ways(
+    clip: Clip, found: Walked, free: Retargeted, robot: Robot
+) -> Iterator[tuple[RobotClip, Walked]]:
+    """Ways to walk as it is found, then with steps of the planner's, where those are others."""
+    yield from _ways(free, found, robot)
+    try:
+        others = find_commands(clip, robot, free.scale, ENOUGH, own=False)
+    except ConfigError:  # at the clip's whole way its speed may change too soon
+        return
+    if not np.array_equal(others.commands, found.commands):
+        yield from _ways(free, others, robot)
 
 
 def _ways(free: Retargeted, found: Walked, robot: Robot) -> Iterator[tuple[RobotClip, Walked]]:

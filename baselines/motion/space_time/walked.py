@@ -52,7 +52,7 @@ LEARNED_BANK = 0.0875  # [g] of speed times turning rate, above which robots fal
 ASKED_BANK = 0.091  # [g] commanded in curves at most: it goes slower than commanded
 ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, of the policy's training
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
-FALLS = "the robot falls with its own steps"
+NOT_HELD = "the robot falls with its own steps, or does not take them"
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 
 
@@ -154,7 +154,7 @@ def find_commands(
                           f"{tempo:.2f} plays it so)", source=clip.name, field="speed")  # fmt: skip
     rows = np.array([[start, *(rate[these].mean() for rate in (ahead, left, turn)), lasts]
                      for these, (start, _, lasts) in zip(frames, each, strict=True)])  # fmt: skip
-    found = own_steps(rows, robot, least) if own else OwnSteps(FALLS)
+    found = own_steps(rows, robot, least) if own else OwnSteps(NOT_HELD)
     bound = found.bound or out_of_turn(planted, clip.dt)
     check_changes(faster(rows, tempo) if found.bound else found.commands, robot, clip.name)
     if not found.bound:

@@ -35,7 +35,7 @@ def test_a_walk_that_never_holds_is_the_one_that_fails_last() -> None:
 
 def test_the_planners_steps_are_taken_where_the_robot_falls_with_the_clips() -> None:
     clip, found, held = walked([FELL] * OWN + [(1.0, 0.2)])
-    assert held and found.bound == "the robot falls with its own steps"
+    assert held and found.bound == "the robot falls with its own steps, or does not take them"
     assert not clip.about.free_arms and found.tempo == 1.0
 
 

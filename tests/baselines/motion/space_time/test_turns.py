@@ -15,12 +15,12 @@ def test_steps_within_the_limit_turn_as_they_did() -> None:
 
 
 def test_a_step_that_turns_too_far_leaves_it_to_those_around() -> None:
-    """Within what bends allow; the whole turn is the same. Alone it keeps its turn."""
+    """Within what bends allow; the whole turn is the same to 3°. Alone it keeps its turn."""
     each = [(0.5 * k, 0.5 * k + 0.5, 0.5) for k in range(6)]
     rates, going = 2.0 * np.array([0.0, 0.0, 0.8, 0.0, 0.0, 0.0]), np.full(6, 0.8)
     spread = spread_rates(each, rates, going, 2.78)
     assert 0.5 * np.abs(spread).max() <= 0.065 * 2.78 / (0.7 * 0.8) + 1e-9
-    assert np.sum(spread) == pytest.approx(np.sum(rates), rel=0.07)
+    assert abs(0.5 * np.sum(spread - rates)) < np.radians(3.0)
     np.testing.assert_array_equal(spread_rates(each[2:3], rates[2:3], going[2:3], 2.78), rates[2:3])
 
 
